@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -178,20 +178,18 @@ def compensate_file(
         program_of(data, name, machine.config), machine, method=method, tolerance_um=tolerance_um, arcs=arcs,
         mirror=mirror, stock=stock,
     )  # fmt: skip
-    outputs: dict[str, bytes] = {}
-    if output:
-        outputs[output] = result.data
-    if joints:
-        outputs[joints] = result.joint_file(joints)
-    if paths:
-        outputs[paths] = result.paths_file()
-    if summary:
-        outputs[summary] = result.summary.to_json()
-    if report:
-        inputs = [Input("program", name, data)]
-        inputs += [Input("configuration", display_name(each), read_bytes(each)) for each in configs if each != STANDARD]
-        outputs[report] = result.report(inputs)
+    asked_for: list[tuple[str | None, Callable[[str], bytes]]] = [
+        (output, lambda _: result.data), (joints, result.joint_file), (paths, lambda _: result.paths_file()),
+        (summary, lambda _: result.summary.to_json()),
+        (report, lambda _: result.report([Input("program", name, data), *_configurations(configs)])),
+    ]  # fmt: skip
+    outputs = {each: make(each) for each, make in asked_for if each}
     failed = result.failed
     if not dry_run:
         write_all(outputs, inputs=(program, *configs, *mirror))
     return FileOutcome(result.summary, failed, {each: len(made) for each, made in outputs.items()})
+
+
+def _configurations(configs: Sequence[str]) -> list[Input]:
+    """The machine files as inputs of a report, without standard input."""
+    return [Input("configuration", display_name(each), read_bytes(each)) for each in configs if each != STANDARD]

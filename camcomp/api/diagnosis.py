@@ -16,7 +16,7 @@ from camcomp.ground.files import read_bytes
 from camcomp.ground.places import STANDARD
 from camcomp.ground.progress import part
 from camcomp.model.config.linuxcnc_ini import SUFFIX as INI_SUFFIX
-from camcomp.model.config.load import load_config, load_experiment
+from camcomp.model.config.load import ExperimentFile, read_experiment
 from camcomp.model.config.write_back import carried, machine_file, with_causes
 from camcomp.report.page import Listing
 
@@ -31,18 +31,23 @@ MOST_LISTED = 200_000  # characters: largest file of a next experiment on the pa
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ExperimentDiagnosis:
-    """The diagnosis of an experiment file. result: as `diagnose --json` writes it.
+    """The diagnosis of an experiment file. file: it and its machine; result: as `diagnose --json` writes it.
 
     behind, opened: the fit and the opened experiment; None for logs without programs (poses of arms, axes).
     """
 
-    experiment: str
+    file: ExperimentFile
     result: DiagnosisResult
     behind: Diagnosis | None
     opened: OpenExperiment | None
     _residuals: Callable[[], dict[str, Any]]
     _learned: tuple[LearnedLaw, ...] = ()
     _notes: tuple[str, ...] = ()
+
+    @property
+    def experiment(self) -> str:
+        """Path of the experiment file."""
+        return self.file.path
 
     @property
     def verdict(self) -> str:
@@ -62,7 +67,7 @@ class ExperimentDiagnosis:
     @property
     def configs(self) -> list[str]:
         """Machine files of the experiment."""
-        return load_experiment(self.experiment).config
+        return self.file.experiment.config
 
     @property
     def answer(self) -> list[str]:
@@ -77,7 +82,7 @@ class ExperimentDiagnosis:
 
         rows = self._residuals() if self.behind is None else None
         return report_of(
-            path=self.experiment,
+            file=self.file,
             result=self.result,
             done=self.behind,
             opened=self.opened,
@@ -99,7 +104,8 @@ class ExperimentDiagnosis:
 
     def machine_with_causes(self, target: str = STANDARD) -> str:
         """Text of the machine file with the causes, for a file called `target`."""
-        return machine_with_causes(self.configs, self.result, target, self._learned)
+        actuators = tuple(self.file.config.robot.actuators)
+        return machine_with_causes(self.configs, self.result, target, actuators=actuators, learned=self._learned)
 
     @property
     def next_program_cuts(self) -> bool:
@@ -116,10 +122,9 @@ class ExperimentDiagnosis:
         proposal = self.result.next_experiment
         if proposal is not None and proposal.poses is not None:
             from camcomp.diagnosis.next_experiment.pose_list import pose_list
-            from camcomp.model.config.load import load_config
             from camcomp.model.statics.build import build_robot
 
-            config = load_config(self.configs)
+            config = self.file.config
             robot, _ = build_robot(config.robot, config.tool.tip)
             return pose_list(proposal.poses, tuple(a.revolute for a in robot.actuators), target)
         if proposal is not None and proposal.moves is not None:
@@ -154,18 +159,17 @@ def diagnose(
 
 def _diagnosed(experiment: str | Path, without: Sequence[str], library: str | Path | None) -> ExperimentDiagnosis:
     from camcomp.diagnosis.law.library import keep, learned
-    from camcomp.model.config.load import load_config
 
-    study = None
-    if all(run.program is None for run in load_experiment(experiment).runs):  # slow import
+    file, study = read_experiment(experiment), None
+    if all(run.program is None for run in file.experiment.runs):  # slow import
         from camcomp.diagnosis.studies import study_of
 
-        study = study_of(experiment, without)
+        study = study_of(file, without)
     if study is not None:
         if library is not None and study.result.law is not None and study.result.law.parts:
-            keep(str(library), study.result.law, load_config(load_experiment(experiment).config).robot.name)
+            keep(str(library), study.result.law, file.config.robot.name)
         return ExperimentDiagnosis(
-            experiment=str(experiment),
+            file=file,
             result=study.result,
             behind=None,
             opened=None,
@@ -177,7 +181,7 @@ def _diagnosed(experiment: str | Path, without: Sequence[str], library: str | Pa
     from camcomp.diagnosis.residuals import of_runs
 
     with part(0.0, 0.3):
-        opened = open_experiment(experiment)
+        opened = open_experiment(file)
     sd = opened.experiment.sd
     known = [] if library is None else learned(str(library))
     with part(0.3, 1.0):
@@ -188,7 +192,7 @@ def _diagnosed(experiment: str | Path, without: Sequence[str], library: str | Pa
     if library is not None and done.result.law is not None:
         keep(str(library), done.result.law, opened.job.config.robot.name)
     return ExperimentDiagnosis(
-        experiment=str(experiment),
+        file=file,
         result=done.result,
         behind=done,
         opened=opened,
@@ -198,10 +202,11 @@ def _diagnosed(experiment: str | Path, without: Sequence[str], library: str | Pa
 
 
 def machine_with_causes(
-    configs: Sequence[str], result: DiagnosisResult, target: str, learned: Sequence[LearnedLaw] = ()
-) -> str:
+    configs: Sequence[str], result: DiagnosisResult, target: str, *, actuators: Sequence[str],
+    learned: Sequence[LearnedLaw] = (),
+) -> str:  # fmt: skip
     """Text of the machine file of `configs` with the causes, for a file called `target`; learned: laws by name."""
-    every, before = configs, {each.name: each for each in learned}
+    before = {each.name: each for each in learned}
     parts = [*result.axis_laws, *(() if result.law is None else result.law.parts)]
     laws = [each.model_dump(exclude_none=True) for each in parts]
     for cause in result.known:
@@ -217,7 +222,7 @@ def machine_with_causes(
     to = Path.cwd() if target == STANDARD else Path(target).absolute().parent
     return with_causes(
         texts[k], [each for each in result.known if each.effect not in before], folder=str(Path(configs[k]).absolute().parent), moved_to=str(to), note=note,
-        laws=laws, actuators=tuple(load_config(every).robot.actuators),
+        laws=laws, actuators=tuple(actuators),
     )  # fmt: skip
 
 

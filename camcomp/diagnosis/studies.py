@@ -33,8 +33,8 @@ from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.ground.files import display_name
-from camcomp.model.config.load import load_config, load_experiment
-from camcomp.model.config.spec import Config, Experiment, RunSpec
+from camcomp.model.config.load import ExperimentFile, read_experiment
+from camcomp.model.config.spec import Config, RunSpec
 from camcomp.model.effect import Cause
 from camcomp.model.motion.log_columns import log_columns
 from camcomp.model.statics.arm import arm_of
@@ -57,34 +57,34 @@ class LogStudy:
     notes: tuple[str, ...] = ()
 
 
-def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
+def study_of(file: str | Path | ExperimentFile, without: Sequence[str] = ()) -> LogStudy | None:
     """The study of an experiment without programs: static poses or axis logs; None for the general diagnosis.
 
     Raises ConfigError CC420 where the logs say too little, CC407, CC408, CC412, CC413 where they cannot be of this machine
     as they are read.
     """
-    opened = _open(path)
+    opened = _open(read_experiment(file))
     logs, robot = opened.logs, opened.robot
     try:
         if all(m.has("tip") and m.has("encoder") and not m.has("setpoint") for m in logs):
             if arm_of(robot) is None:
                 return None
             runs = _checked_poses(opened)
-            sd = opened.experiment.sd
+            sd = opened.file.experiment.sd
             stated = StatedDeviation(sd.tip_mm, sd.encoder_mm) if sd else StatedDeviation()
-            own = _causes(opened.config)
-            holdout = opened.experiment.holdout
+            own = _causes(opened.file.config)
+            holdout = opened.file.experiment.holdout
             result, notes = study_arm(robot, own, runs, holdout=holdout, without=without, stated=stated)
             bench = partial(bench_of, robot, tuple(own), runs, holdout)
             return LogStudy(result, partial(of_poses, bench, result), (*opened.notes, *notes))
         if not any(m.has("tip") for m in logs) and all(m.has("encoder") for m in logs):
             axes = _checked_axes(opened)
-            sd = opened.experiment.sd
+            sd = opened.file.experiment.sd
             deviation = (
                 AxisDeviation(sd.encoder_mm, sd.force_N, sd.encoder_rad, sd.force_Nmm) if sd else AxisDeviation()
             )
             result, found = study_axes(
-                axes, holdout=opened.experiment.holdout, without=without, stated=deviation, robot=robot
+                axes, holdout=opened.file.experiment.holdout, without=without, stated=deviation, robot=robot
             )
             by_axis = {a.name: a.revolute for a in robot.actuators}
             return LogStudy(result, partial(of_axes, found, by_axis), (*opened.notes, *_without_masses(opened)))
@@ -92,12 +92,12 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
         message = (
             f"the rows do not determine the fit: some columns do not move, or repeat others; {_channels_there(opened)}"
         )
-        raise ConfigError("CC420", message, at=Location(display_name(path), 1, 1)) from error
+        raise ConfigError("CC420", message, at=Location(display_name(opened.file.path), 1, 1)) from error
     except ValidationError:  # a ValueError too, and a fault of ours
         raise
     except ValueError as error:
         message = f"{error}; {_channels_there(opened)}"
-        raise ConfigError("CC420", message, at=Location(display_name(path), 1, 1)) from error
+        raise ConfigError("CC420", message, at=Location(display_name(opened.file.path), 1, 1)) from error
     return None
 
 
@@ -130,36 +130,34 @@ def _channels_there(opened: _Opened) -> str:
 class _Opened:
     """An experiment whose runs have no program: its files, a log per run, and notes for the reader."""
 
-    experiment: Experiment
-    config: Config
+    file: ExperimentFile
     robot: Robot
     logs: list[Measured]
     notes: list[str]
 
 
-def _open(path: str | Path) -> _Opened:
-    experiment = load_experiment(path)
-    config = load_config(experiment.config)
+def _open(file: ExperimentFile) -> _Opened:
+    experiment, config = file.experiment, file.config
     robot, _ = build_robot(config.robot, config.tool.tip)
     columns = log_columns([a.name for a in robot.actuators], [a.revolute for a in robot.actuators])
     tables = [open_log(run.log) for run in experiment.runs]
     notes = [note for table in tables for note in unread(table, columns)]
-    return _Opened(experiment, config, robot, [read_log(table, columns) for table in tables], notes)
+    return _Opened(file, robot, [read_log(table, columns) for table in tables], notes)
 
 
-def open_axes(path: str | Path) -> dict[str, list[AxisRun]]:
+def open_axes(file: str | Path | ExperimentFile) -> dict[str, list[AxisRun]]:
     """Runs of every axis by name, of an experiment whose logs have no tip. Raises ConfigError CC407, CC408."""
-    return _checked_axes(_open(path))
+    return _checked_axes(_open(read_experiment(file)))
 
 
-def open_poses(path: str | Path) -> list[Poses]:
+def open_poses(file: str | Path | ExperimentFile) -> list[Poses]:
     """Static poses of every run. Raises ConfigError CC407, CC408, CC412, CC413."""
-    return _checked_poses(_open(path))
+    return _checked_poses(_open(read_experiment(file)))
 
 
 def _checked_axes(opened: _Opened) -> dict[str, list[AxisRun]]:
-    robot, causes = opened.robot, _causes(opened.config)
-    runs = list(zip(opened.experiment.runs, opened.logs, strict=True))
+    robot, causes = opened.robot, _causes(opened.file.config)
+    runs = list(zip(opened.file.experiment.runs, opened.logs, strict=True))
     for run, log in runs:
         check_clock(display_name(run.log), log)
     late = [predict_encoders(robot, causes, log, run.started_s) for run, log in runs]
@@ -177,8 +175,8 @@ def _checked_axes(opened: _Opened) -> dict[str, list[AxisRun]]:
 
 
 def _checked_poses(opened: _Opened) -> list[Poses]:
-    runs = [_poses(run, log) for run, log in zip(opened.experiment.runs, opened.logs, strict=True)]
-    for run, each in zip(opened.experiment.runs, runs, strict=True):
+    runs = [_poses(run, log) for run, log in zip(opened.file.experiment.runs, opened.logs, strict=True)]
+    for run, each in zip(opened.file.experiment.runs, runs, strict=True):
         opened.notes.extend(check_poses(display_name(run.log), run.name, opened.robot, each.q, each.tip))
     return runs
 

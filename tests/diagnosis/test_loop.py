@@ -19,7 +19,9 @@ def test_the_corrected_program_shrinks_the_error_as_predicted(workshop, tmp_path
     path, made = workshop.made(plan)
     result, better = workshop.answer(plan)[0], tmp_path / "better.yaml"
     better.write_text(
-        machine_with_causes([str(path.parent / "machine.yaml")], workshop.answer(plan)[1].result, str(better))
+        machine_with_causes(
+            [str(path.parent / "machine.yaml")], workshop.answer(plan)[1].result, str(better), actuators=("x", "y", "z")
+        )
     )
     assert "# found by camcomp diagnose" in better.read_text()
     program = next(p for p, r in zip(made.programs, made.runs, strict=True) if r.cutting and "G3" in p)

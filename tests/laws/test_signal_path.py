@@ -126,10 +126,7 @@ class Scene:
         """Tips (n, 3) and drive forces (n, m) that `simulate` prints."""
         job = with_causes(self.job, causes)
         twin = twin_of(job)
-        run_path = path_of_program(
-            "law", self.timeline, self.track, self.time, started=0.0, to_machine=twin.to_machine,
-            vectors=job.frame.vectors, inverse=twin.inverse,
-        )  # fmt: skip
+        run_path = path_of_program(twin, "law", self.timeline, self.track, self.time, started=0.0)
         _, solved = twin.sense(run_path)
         reading, _ = twin.sense(run_path, solved=solved, slopes=twin.slopes(run_path, (), solved))
         return reading.tip, reading.drive

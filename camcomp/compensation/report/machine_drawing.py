@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -99,6 +99,31 @@ def _way(chain: Chain) -> Floats | None:
     return None
 
 
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Lines of the drawing: their traces, their points without load, and the shift of every point by the load."""
+
+    traces: list[Json] = field(default_factory=list)
+    base: list[dict[str, list[float | None]]] = field(default_factory=list)
+    shifts: list[dict[str, list[float | None]]] = field(default_factory=list)
+
+    def add(self, name: str, points: Floats, shift: Floats, style: Json, *, legend: bool = True) -> None:
+        """Add a line through points (k, 3) mm with shifts (k, 3) mm."""
+        self.traces.append({
+            "type": "scatter3d", "mode": "lines", "name": name, "line": style, "showlegend": legend, "hoverinfo": "name",
+        })  # fmt: skip
+        self.base.append({a: numbers(points[:, i], 4) for i, a in enumerate("xyz")})
+        self.shifts.append({a: numbers(shift[:, i], 6) for i, a in enumerate("xyz")})
+
+    def add_leg(self, name: str, leg: DrawnLeg, bent: DrawnLeg, off: Floats, style: Json) -> None:
+        """Add a leg and its bars; bent: the same leg behind the tip's shift off (3,) mm."""
+        moved = bent.nodes - leg.nodes
+        missed = off - moved[-1]  # deflection of springs, which the joints of the drawing cannot follow
+        self.add(name, leg.nodes, moved + np.linspace(0.0, 1.0, len(moved))[:, None] * missed, style)
+        for bar, bent_bar in zip(leg.bars, bent.bars, strict=True):
+            self.add(f"{name}, bar", bar, bent_bar - bar, style | {"width": 3}, legend=False)
+
+
 def figure_machine(result: Compensated, job: Job, drawn: DrawnPath) -> Figure | None:
     """The machine at the largest error of the original program, deflection enlarged by a slider; None without legs."""
     row = drawn.worst(drawn.before)
@@ -112,37 +137,23 @@ def figure_machine(result: Compensated, job: Job, drawn: DrawnPath) -> Figure | 
     if not legs or len(bent) != len(legs) or not np.isfinite(off).all():
         return None
     size = float(np.ptp(np.concatenate([tip[None], *(leg.nodes for leg in legs)]), axis=0).max())
-    traces: list[Json] = []
-    base: list[dict[str, list[float | None]]] = []
-    shifts: list[dict[str, list[float | None]]] = []
-
-    def add(name: str, points: Floats, shift: Floats, style: Json, *, legend: bool = True) -> None:
-        traces.append({
-            "type": "scatter3d", "mode": "lines", "name": name, "line": style, "showlegend": legend, "hoverinfo": "name",
-        })  # fmt: skip
-        base.append({a: numbers(points[:, i], 4) for i, a in enumerate("xyz")})
-        shifts.append({a: numbers(shift[:, i], 6) for i, a in enumerate("xyz")})
-
+    lines = _Lines()
     for i, (leg, other) in enumerate(zip(legs, bent, strict=True)):
-        style: Json = {"color": f"var(--c{i % 6 + 1})", "width": 7}
-        moved = other.nodes - leg.nodes
-        missed = leg.nodes[-1] + off - other.nodes[-1]  # what springs give way by, which no joint can follow
         name = leg.name if len(legs) == 1 or leg.name.startswith("leg") else f"leg {leg.name}"
-        add(name, leg.nodes, moved + np.linspace(0.0, 1.0, len(moved))[:, None] * missed, style)
-        for bar, bent_bar in zip(leg.bars, other.bars, strict=True):
-            add(f"{name}, bar", bar, bent_bar - bar, style | {"width": 3}, legend=False)
+        lines.add_leg(name, leg, other, off, {"color": f"var(--c{i % 6 + 1})", "width": 7})
         if leg.way is not None and np.linalg.norm(leg.way[1] - leg.way[0]) < _LONGEST * size:
-            add(f"travel of {leg.name}", leg.way, np.zeros((2, 3)), {"color": "var(--c6)", "width": 2}, legend=False)
+            style: Json = {"color": "var(--c6)", "width": 2}
+            lines.add(f"travel of {leg.name}", leg.way, np.zeros((2, 3)), style, legend=False)
     tool = np.array([tip - held @ robot.tool, tip])
-    add("tool", tool, np.tile(off, (2, 1)), {"color": INK, "width": 9})
+    lines.add("tool", tool, np.tile(off, (2, 1)), {"color": INK, "width": 9})
     shown = np.flatnonzero(~drawn.hidden)
     shown = shown[thin(result.rows.target[shown])]
     path = origin + result.rows.target[shown] @ turn.T
-    add("programmed path", path, 0.0 * path, {"color": INK, "width": 3})
+    lines.add("programmed path", path, 0.0 * path, {"color": INK, "width": 3})
     deviation = np.nan_to_num(result.uncorrected[shown] - result.rows.target[shown]) @ turn.T
-    add("original program under load", path, deviation, {"color": "var(--bad)", "width": 4})
+    lines.add("original program under load", path, deviation, {"color": "var(--bad)", "width": 4})
     shift = (result.written.end[shown] - result.rows.target[shown]) @ turn.T
-    add("commanded instead", path, shift, {"color": "var(--good)", "width": 4})
+    lines.add("commanded instead", path, shift, {"color": "var(--good)", "width": 4})
     largest = float(np.linalg.norm(off))
     words = f"{micrometres(1e3 * largest)} in line {drawn.line[row]}"
     return Figure(
@@ -151,15 +162,15 @@ def figure_machine(result: Compensated, job: Job, drawn: DrawnPath) -> Figure | 
         caption=f"Legs, tool and path where the load takes the tip off by {words}. Legs follow the platform; its tilt is not drawn. The "
         "slider says how much deviations are enlarged. Drag to turn.",
         label=f"Three-dimensional drawing of the machine at the place of the largest error, {words}.",
-        traces=traces,
+        traces=lines.traces,
         layout={
             "scene": _scene(np.concatenate([path, *(leg.nodes for leg in legs)])),
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         },
         height=560,
         exaggerate={
-            "base": base,
-            "shifts": shifts,
+            "base": lines.base,
+            "shifts": lines.shifts,
             "planes": [],
             "first": float(np.clip(_SHOWN * size / max(largest, 1e-9), 1.0, 1e5)),
             "most": 1e6,

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -95,7 +94,6 @@ def drive(
     conditions: Conditions,
     twin: Twin,
     started: float,
-    vectors: Callable[[Floats], Floats],
     temperature: Floats | None,
     acceleration: float,
 ) -> DrivenRun:
@@ -104,81 +102,111 @@ def drive(
     Raises ConfigError CC402, CC406 to CC408.
     """
     program = None if text is None else _open(text, conditions, twin)
-    by = next((each for each in ("setpoint", "encoder", "tip") if measured.has(each)), "")
-    if not by or (by == "tip" and program is None):
-        message = f"run '{name}' has neither a program nor set-points: nobody knows where the machine was told to go"
-        raise ConfigError("CC402", message, at=Location(log, 1, 1))
-    if by == "tip":
-        assert program is not None
+    by = _channel(log, name, measured, has_program=program is not None)
+    if by == "tip" and program is not None:
         return _led_by_tip(
-            log, name, measured=measured, program=program, twin=twin, started=started, vectors=vectors,
+            log, name, measured=measured, program=program, twin=twin, started=started,
             temperature=temperature, acceleration=acceleration,
         )  # fmt: skip
-    told = getattr(measured, by)
-    known = np.isfinite(told)
-    if known.sum(axis=0).min() < 2:
-        raise ConfigError(
-            "CC404", f"run '{name}': hardly a row holds the {by} of every actuator", at=Location(log, 1, 1)
-        )
-    rho = np.column_stack([_over_time(measured.time, v) for v in told.T])
-    guessed = np.column_stack([
-        _guessed(measured.time, v, GUESSED_RAD if a.revolute else GUESSED_MM)
-        for v, a in zip(told.T, twin.robot.actuators, strict=True)
-    ])  # fmt: skip
-    rotary = all(a.revolute for a in twin.robot.actuators)
+    rho, guessed = _commanded(log, name, measured, by, twin)
+    revolute = np.array([a.revolute for a in twin.robot.actuators])
+    rotary = bool(revolute.all())
     if program is not None:
         check_set_points(log, name, what=by, told=rho, program=program.rho, actuators=twin.actuators, rotary=rotary)
-    near, turned = _near(log=log, name=name, measured=measured, rho=rho, program=program, twin=twin)
-    tip, turned = _forward(twin, rho, near, turned)
+    tip, turned = _forward(
+        twin, rho, *_near(log=log, name=name, measured=measured, rho=rho, program=program, twin=twin)
+    )
     aligned = None if program is None else _aligned(log, name, program, tip, measured)
-    unsure = np.asarray(guessed.any(axis=1))
-    if program is None or aligned is None:
-        forces, told = _measured_forces(measured, vectors), False
-    else:
-        try:
-            cut = _behind(measured, tip, turned, program, twin) if by == "setpoint" else None
-        except PhysicsError:  # also for encoders in another unit
-            check_places(
-                log, name, measured=measured, rho=rho, tip=tip, actuators=twin.actuators, rotary=rotary,
-                loaded=lambda: tip,
-            )  # fmt: skip
-            raise
-        told = by == "setpoint" and cut is None
-        forces = cutting_forces(
-            track=program.track, aligned=cut or aligned, tip=tip, time=measured.time, rests=program.rests,
-            logged_line=bool(np.isfinite(measured.line).any()),
-        )  # fmt: skip
-        idle = _idle_or_not(forces, aligned, program, tip, measured.time)
-        unsure |= idle
-        # at standstill in a cut the drives may carry the cutting force or not
-        forces = replace(forces, doubt=np.where(idle[:, None], 0.5 * np.abs(forces.force), forces.doubt))
+    check = partial(
+        check_places, log, name, measured=measured, rho=rho, tip=tip, actuators=twin.actuators, rotary=rotary
+    )
+    cut: Aligned | None = None
+    try:
+        if program is not None and by == "setpoint":
+            cut = _behind(measured, tip, turned, program, twin)
+    except PhysicsError:  # also for encoders in another unit
+        check(loaded=lambda: tip)
+        raise
+    forces, idle = _forces_at_rows(program, aligned, cut, tip, measured=measured, twin=twin)
     run_path = driven_path(
-        name, measured.time, rho, tip, forces, started=started, to_machine=twin.to_machine, vectors=vectors,
-        inverse=twin.inverse, temperature=temperature, rotation=turned,
+        twin, name, time=measured.time, rho=rho, tip=tip, forces=forces, started=started, temperature=temperature,
+        rotation=turned,
     )  # fmt: skip
-    run_path = replace(run_path, measured_force=program is None)
-    if program is not None:
+    if program is None:
+        run_path = replace(run_path, measured_force=True)
+    else:
         run_path = replace(
-            run_path, feed_mm_per_min=program.feed, cut_ahead_min=_cut_ahead(program, aligned), told=told
-        )
+            run_path, feed_mm_per_min=program.feed, cut_ahead_min=_cut_ahead(program, aligned),
+            told=by == "setpoint" and cut is None,
+        )  # fmt: skip
     loaded = cache(lambda: twin.sense(run_path)[0])
-    check_places(
-        log, name, measured=measured, rho=rho, tip=tip, actuators=twin.actuators, rotary=rotary,
-        loaded=lambda: loaded().tip,
-    )  # fmt: skip
-    turns = np.array([a.revolute for a in twin.robot.actuators])
+    check(loaded=lambda: loaded().tip)
     check_forces(
-        name=log, run=name, measured=measured, force=run_path.row_force, drives=lambda: loaded().drive, rotary=turns
+        name=log, run=name, measured=measured, force=run_path.row_force, drives=lambda: loaded().drive, rotary=revolute
     )
     return DrivenRun(
-        run_path=run_path, by=by, unsure=unsure, guessed=guessed, turn=None, lag=0 if aligned is None else aligned.lag
-    )
+        run_path=run_path, by=by, unsure=np.asarray(guessed.any(axis=1)) | idle, guessed=guessed, turn=None,
+        lag=0 if aligned is None else aligned.lag,
+    )  # fmt: skip
 
 
-def _measured_forces(measured: Measured, vectors: Callable[[Floats], Floats]) -> Forces:
+def _channel(log: str, name: str, measured: Measured, *, has_program: bool) -> str:
+    """Channel of the motion: set-points, else encoders, else the tip along a program. Raises ConfigError CC402."""
+    by = next((each for each in ("setpoint", "encoder", "tip") if measured.has(each)), "")
+    if not by or (by == "tip" and not has_program):
+        message = f"run '{name}' has neither a program nor set-points: the commanded motion is unknown"
+        raise ConfigError("CC402", message, at=Location(log, 1, 1))
+    return by
+
+
+def _commanded(log: str, name: str, measured: Measured, by: str, twin: Twin) -> tuple[Floats, Bools]:
+    """Actuators (n, m) of the channel `by` over time, and a mask (n, m) of those that are unknown. Raises CC404."""
+    logged = getattr(measured, by)
+    if np.isfinite(logged).sum(axis=0).min() < 2:
+        message = f"run '{name}': hardly a row holds the {by} of every actuator"
+        raise ConfigError("CC404", message, at=Location(log, 1, 1))
+    guessed = [
+        _guessed(measured.time, v, GUESSED_RAD if a.revolute else GUESSED_MM)
+        for v, a in zip(logged.T, twin.robot.actuators, strict=True)
+    ]
+    return np.column_stack([_over_time(measured.time, v) for v in logged.T]), np.column_stack(guessed)
+
+
+def _forces_at_rows(
+    program: _Program | None,
+    aligned: Aligned | None,
+    cut: Aligned | None,
+    tip: Floats,
+    *,
+    measured: Measured,
+    twin: Twin,
+) -> tuple[Forces, Bools]:
+    """Cutting forces at the rows, and a mask (n,) of rows at standstill that may be idle.
+
+    cut: positions of the drives on the program, where they are behind the set-points `aligned`.
+    """
+    if program is None or aligned is None:
+        return _measured_forces(measured, twin), np.zeros(len(tip), bool)
+    forces = _program_forces(program, cut or aligned, tip, measured)
+    idle = _idle_or_not(forces, aligned, program, tip, measured.time)
+    # at standstill in a cut the drives may carry the cutting force or not
+    return replace(forces, doubt=np.where(idle[:, None], 0.5 * np.abs(forces.force), forces.doubt)), idle
+
+
+def _program_forces(
+    program: _Program, aligned: Aligned, tip: Floats, measured: Measured, max_distance_mm: float = MAX_CUT_DISTANCE_MM
+) -> Forces:
+    """Cutting forces of the program at tips (n, 3) mm aligned with it."""
+    return cutting_forces(
+        track=program.track, aligned=aligned, tip=tip, time=measured.time, rests=program.rests,
+        logged_line=bool(np.isfinite(measured.line).any()), max_distance_mm=max_distance_mm,
+    )  # fmt: skip
+
+
+def _measured_forces(measured: Measured, twin: Twin) -> Forces:
     """Cutting force of a log without program: what the dynamometer measured, none without one.
 
-    vectors: program -> machine frame. An empty cell lies between its neighbours in time, with their difference as doubt.
+    An empty cell lies between its neighbours in time, with their difference as doubt.
     """
     force = measured.force()
     known = np.asarray(np.isfinite(measured.dyno[:, np.isfinite(measured.dyno).any(axis=0)]).all(axis=1))
@@ -186,8 +214,8 @@ def _measured_forces(measured: Measured, vectors: Callable[[Floats], Floats]) ->
     after = np.searchsorted(around[:-1], np.arange(len(known)))
     apart = np.abs(force[around[after]] - force[around[np.maximum(after - 1, 0)]])
     doubt = np.where(known[:, None], 0.0, apart)
-    to_program = vectors(np.eye(3)).T
-    return replace(Forces.none(len(known)), force=force @ to_program, doubt=np.abs(doubt @ to_program))
+    force, doubt = force @ twin.rotation, np.abs(doubt @ twin.rotation)  # from the machine to the program frame
+    return replace(Forces.none(len(known)), force=force, doubt=doubt)
 
 
 def _open(program: Program, conditions: Conditions, twin: Twin) -> _Program:
@@ -338,7 +366,6 @@ def _led_by_tip(
     program: _Program,
     twin: Twin,
     started: float,
-    vectors: Callable[[Floats], Floats],
     temperature: Floats | None,
     acceleration: float,
 ) -> DrivenRun:
@@ -359,15 +386,11 @@ def _led_by_tip(
             known=np.asarray(known),
         )  # fmt: skip
         tip = path_geometry.points(way, on.motion, on.share)
-        logged = bool(np.isfinite(measured.line).any())
-        forces = cutting_forces(
-            track=program.track, aligned=aligned, tip=tip, time=measured.time, rests=program.rests,
-            logged_line=logged, max_distance_mm=beside,
-        )  # fmt: skip
+        forces = _program_forces(program, aligned, tip, measured, beside)
         turned = twin.platform(way, on.motion, on.share)
         run_path = driven_path(
-            name, measured.time, twin.inverse(twin.to_machine(tip), turned), tip, forces, started=started,
-            to_machine=twin.to_machine, vectors=vectors, inverse=twin.inverse, temperature=temperature, rotation=turned,
+            twin, name, time=measured.time, rho=twin.inverse(twin.to_machine(tip), turned), tip=tip, forces=forces,
+            started=started, temperature=temperature, rotation=turned,
         )  # fmt: skip
         loaded = twin.sense(run_path)[0].tip
         last, changed = changed, float(np.sqrt(np.mean(np.sum((loaded - tip - bend) ** 2, axis=1))))

@@ -21,7 +21,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.files import display_name, read_bytes
 from camcomp.ground.progress import steps
-from camcomp.model.config.load import load_config, load_experiment
+from camcomp.model.config.load import ExperimentFile, read_experiment
 from camcomp.model.config.spec import Config, Experiment, RunSpec
 from camcomp.model.control import open_program
 from camcomp.model.from_program import job_of_program
@@ -46,11 +46,10 @@ class OpenExperiment:
     notes: tuple[str, ...]
 
 
-def open_experiment(path: str | FilePath) -> OpenExperiment:
+def open_experiment(file: str | FilePath | ExperimentFile) -> OpenExperiment:
     """Open an experiment file with all its files. Raises ConfigError, ProgramError, FileError, PhysicsError."""
-    experiment = load_experiment(path)
-    config = load_config(experiment.config)
-    job = Job(config)
+    file = read_experiment(file)
+    experiment, job = file.experiment, Job(file.config)
     twin = twin_of(job)
     notes: list[str] = []
     runs = [open_run(spec, job, twin, notes) for spec in steps(experiment.runs, len(experiment.runs))]
@@ -77,7 +76,7 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
         check_length(log, spec.name, measured, schedule(program.path, job.config.control.acceleration_mm_per_s2).end)
     run = drive(
         log, spec.name, measured=measured, text=program, conditions=conditions, twin=twin, started=spec.started_s,
-        vectors=job.frame.vectors, temperature=steadied(measured.time, measured.temperature),
+        temperature=steadied(measured.time, measured.temperature),
         acceleration=job.config.control.acceleration_mm_per_s2,
     )  # fmt: skip
     if run.lag:

@@ -202,8 +202,8 @@ def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
     time = np.arange(0.0, last, max(usual, last / ROWS))
     conditions = job.conditions if candidate.cutting else replace(job.conditions, model=None)
     run_path = path_of_program(
-        "candidate", timeline, lay_track(path, conditions), time, started=candidate.started, to_machine=twin.to_machine,
-        vectors=job.frame.vectors, inverse=twin.inverse, platform=twin.platform, temperature=_temperature(problem, candidate.started + time),
+        twin, "candidate", timeline, lay_track(path, conditions), time, started=candidate.started,
+        temperature=_temperature(problem, candidate.started + time),
     )  # fmt: skip
     n, m = len(time), len(twin.actuators)
     nan = np.full(n, np.nan)

@@ -80,34 +80,12 @@ def diagnosis_html(
     if len(result.alternatives) > 1:
         sections.append(_apart(result, rivals, views))
     if result.shrinkage and result.shrinkage.steps:
-        ladder = figure_ladder(result.shrinkage, floor)
-        sections.append(
-            Section(
-                name="shrinkage", title="How far the gap shrinks", text=[_shrinkage(result.shrinkage)], figures=[ladder]
-            )
-        )
+        text, ladder = [_shrinkage(result.shrinkage)], figure_ladder(result.shrinkage, floor)
+        sections.append(Section(name="shrinkage", title="How far the gap shrinks", text=text, figures=[ladder]))
     if (joints := joints_section(result, residuals)) is not None:
         sections.append(joints)
-    shown = seen[:MOST_RUNS]
-    if shown:
-        left_out = len(seen) - len(shown)
-        text = [f"The {len(shown)} runs with the largest gap; {left_out} more are not drawn."] if left_out else []
-        sections += [
-            Section(
-                name="time",
-                title="Gap along the time",
-                text=text,
-                figures=[figure_signed(v, i) for i, v in enumerate(shown, 1)],
-            ),
-            Section(
-                name="path",
-                title="Gap along the path",
-                text=text,
-                figures=[figure_size(v, i, floor) for i, v in enumerate(shown, 1)],
-            ),
-            Section(name="map", title="On the workpiece", figures=[figure_map(seen)]),
-        ]
-    sections.append(_where(result.where, shown))
+    sections += _gap_of_runs(seen, floor)
+    sections.append(_where(result.where, seen[:MOST_RUNS]))
     if (standards := standards_section(result.standards)) is not None:
         sections.append(standards)
     if inputs:
@@ -123,6 +101,22 @@ def diagnosis_html(
         word=WORDS[verdict],
     )
     return render(page)
+
+
+def _gap_of_runs(views: Sequence[RunView], floor: float | None) -> list[Section]:
+    """Sections of the gap along time, path and workpiece; views: runs, the one with the largest gap first."""
+    if not views:
+        return []
+    shown = views[:MOST_RUNS]
+    left_out = len(views) - len(shown)
+    text = [f"The {len(shown)} runs with the largest gap; {left_out} more are not drawn."] if left_out else []
+    along_time = [figure_signed(v, i) for i, v in enumerate(shown, 1)]
+    along_path = [figure_size(v, i, floor) for i, v in enumerate(shown, 1)]
+    return [
+        Section(name="time", title="Gap along the time", text=text, figures=along_time),
+        Section(name="path", title="Gap along the path", text=text, figures=along_path),
+        Section(name="map", title="On the workpiece", figures=[figure_map(views)]),
+    ]
 
 
 def _cards(result: DiagnosisResult) -> list[tuple[str, str, str]]:

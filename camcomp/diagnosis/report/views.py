@@ -21,7 +21,7 @@ from camcomp.diagnosis.report.page import diagnosis_html
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView
 from camcomp.diagnosis.result.types import DiagnosisResult, NamedCause
 from camcomp.ground.files import read_bytes
-from camcomp.model.config.load import load_config, load_experiment
+from camcomp.model.config.load import ExperimentFile
 from camcomp.model.effect import Cause
 from camcomp.model.motion.twin import Twin
 from camcomp.report.inputs import Input
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 def report_of(
-    path: str,
+    file: ExperimentFile,
     result: DiagnosisResult,
     done: Diagnosis | None,
     opened: OpenExperiment | None,
@@ -45,8 +45,8 @@ def report_of(
 
     next_program: file of the proposed experiment.
     """
-    experiment = load_experiment(path)
-    inputs = [Input("experiment", str(path), read_bytes(path))]
+    experiment = file.experiment
+    inputs = [Input("experiment", file.path, read_bytes(file.path))]
     inputs += [Input("configuration", each, read_bytes(each)) for each in experiment.config]
     for run in experiment.runs:
         if run.program is not None:
@@ -58,7 +58,7 @@ def report_of(
         views = views_of(done, opened.twin, opened.runs, experiment.holdout)
         rivals = rivals_of(done)
     return diagnosis_html(
-        result, views, title=PurePath(path).name, machine=load_config(experiment.config).robot.name, inputs=inputs,
+        result, views, title=PurePath(file.path).name, machine=file.config.robot.name, inputs=inputs,
         notes=opened.notes if opened is not None else (), rivals=rivals, next_program=next_program,
         law=law_view(done.problem, done.law) if done is not None and done.law is not None else None,
         residuals=residuals,

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
@@ -92,6 +92,23 @@ def _force_files(node: Node | None) -> list[CamcompError]:
         error.at = error.at or node.at
         return [error]
     return []
+
+
+@dataclass(frozen=True, eq=False)
+class ExperimentFile:
+    """An experiment file and the configuration of its machine files, each read once. path: as given."""
+
+    path: str
+    experiment: Experiment
+    config: Config
+
+
+def read_experiment(file: Path | str | ExperimentFile) -> ExperimentFile:
+    """An experiment file with its machine files; one that was read before is returned. Raises as load_config."""
+    if isinstance(file, ExperimentFile):
+        return file
+    experiment = load_experiment(file)
+    return ExperimentFile(str(file), experiment, load_config(experiment.config))
 
 
 def load_experiment(path: Path | str) -> Experiment:

@@ -228,53 +228,25 @@ def _force(
 
     turned (k, 3, 3): rotation of the tool from the axis of the conditions. The model sees the feed in the frame of the tool.
     """
-    if turned is not None:
-        seen = np.einsum("kji,kj->ki", turned, direction)
-        force = _force(
-            path=path,
-            c=c,
-            cutting=cutting,
-            motion=motion,
-            s0=s0,
-            length=length,
-            load=load,
-            piece=piece,
-            w=w,
-            direction=seen,
-            tip=tip,
-            driven=driven,
-        )
-        out: Floats = np.einsum("kij,kj->ki", turned, force)
-        return out
     out = np.zeros((len(piece), 3))
     on = cutting[piece] & (np.linalg.norm(direction, axis=1) > 0.0)
     if c.model is None or not on.any():
         return out
+    seen = direction if turned is None else np.einsum("kji,kj->ki", turned, direction)
     if load is not None and not c.plunges:
-        out[on] = to_vector(load.base(piece[on], w[on]), direction[on], c.tool_axis)
-        return out
-    rows = motion[piece[on]]
-    fill = np.full(len(rows), np.nan)
-    depth = fill if c.depth_mm is None else np.full(len(rows), c.depth_mm)
-    if c.depth_mm is None and c.stock_top_mm is not None:
-        depth = c.stock_top_mm - tip[on][:, 2]
-    width = fill if c.width_mm is None else np.full(len(rows), c.width_mm)
-    s = s0[piece[on]] + w[on] * length[piece[on]]
-    feed = None if driven is None else driven[on]
-    found = _components(
-        path=path,
-        c=c,
-        motion=rows,
-        direction=direction[on],
-        depth=depth,
-        width=width,
-        s=s,
-        ends=w[on] == 1.0,
-        arcs=None,
-        driven=feed,
-    )
-    out[on] = to_vector(found, direction[on], c.tool_axis)
-    return out
+        found = load.base(piece[on], w[on])
+    else:
+        rows = motion[piece[on]]
+        depth, width = (np.full(len(rows), np.nan if each is None else each) for each in (c.depth_mm, c.width_mm))
+        if c.depth_mm is None and c.stock_top_mm is not None:
+            depth = c.stock_top_mm - tip[on][:, 2]
+        found = _components(
+            path=path, c=c, motion=rows, direction=seen[on], depth=depth, width=width,
+            s=s0[piece[on]] + w[on] * length[piece[on]], ends=w[on] == 1.0, arcs=None,
+            driven=None if driven is None else driven[on],
+        )  # fmt: skip
+    out[on] = to_vector(found, seen[on], c.tool_axis)
+    return out if turned is None else np.einsum("kij,kj->ki", turned, out)
 
 
 def _components(

@@ -54,6 +54,10 @@ class ControlKinematics:
         """Tips (n, 3) program -> machine frame."""
         return self.origin + tip @ self.rotation.T
 
+    def vectors(self, vectors: Floats) -> Floats:
+        """Vectors (n, 3) program -> machine frame."""
+        return vectors @ self.rotation.T
+
     def to_program(self, tip: Floats) -> Floats:
         """Tips (n, 3) machine -> program frame."""
         return (tip - self.origin) @ self.rotation

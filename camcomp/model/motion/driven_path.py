@@ -19,6 +19,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.orientation import rotation_vectors, rotations_about
 from camcomp.model.cutting.track import Track
 from camcomp.model.motion.alignment import Aligned
+from camcomp.model.motion.control_kinematics import ControlKinematics
 from camcomp.model.motion.driven_pieces import DrivenPieces, near_largest_change, node_loads
 from camcomp.model.motion.run_path import MOST_STEPS, STEP_S, Driven, RunPath, moving
 from camcomp.model.seams import Seams, missing_rows
@@ -66,25 +67,22 @@ class Forces:
 
 
 def driven_path(
+    machine: ControlKinematics,
     name: str,
+    *,
     time: Floats,
     rho: Floats,
     tip: Floats,
     forces: Forces,
-    *,
     started: float,
-    to_machine: Callable[[Floats], Floats],
-    vectors: Callable[[Floats], Floats],
-    inverse: Callable[[Floats, Floats | None], Floats],
     temperature: Floats | None = None,
     rotation: Floats | None = None,
 ) -> RunPath:
     """Run path of logged actuators rho (n, m) at times (n,) s with their nominal tips (n, 3) mm, program frame.
 
-    to_machine, vectors: program -> machine frame. inverse: machine tips (q, 3) and rotations (q, 3, 3) -> set-points
-    (q, m). rotation (n, 3, 3): of the platform at the rows, machine frame; None: the one that the machine holds.
+    rotation (n, 3, 3): of the platform at the rows, machine frame; None: the one that the machine holds.
     """
-    row_tip, row_force = to_machine(tip), vectors(forces.force)
+    row_tip, row_force = machine.to_machine(tip), machine.vectors(forces.force)
     span = float(time[-1] - time[0])
     grid = np.linspace(time[0], time[-1], max(int(min(np.ceil(span / STEP_S) + 1, MOST_STEPS)), 2))
     lead, lead_tip = _smooth(time, rho), _smooth(time, row_tip)
@@ -97,7 +95,7 @@ def driven_path(
     # the tip is interpolated, and the drives follow from it: an arm keeps its tool upright between rows
     node_tip = lead_tip(node_time)
     turned = None if rotation is None else _turns(time, rotation, node_time)
-    node_rho = inverse(node_tip, turned)
+    node_rho = machine.inverse(node_tip, turned)
     node_force = node_loads(time=time, force=row_force, sure=sure, jump=jump, at=node_time, pieces=pieces)
     return RunPath(
         name=name,
@@ -117,7 +115,7 @@ def driven_path(
         row_rho=rho,
         temperature=temperature,
         node_rotation=turned,
-        driven=Driven(row_tip, row_force, np.abs(vectors(forces.doubt)), lead_tip, _seams(time, grid, lead)),
+        driven=Driven(row_tip, row_force, np.abs(machine.vectors(forces.doubt)), lead_tip, _seams(time, grid, lead)),
     )
 
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.compiled import kept
-from camcomp.ground.datatypes import Bools, Floats, Ints, Path
+from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import direction
+from camcomp.model.motion.control_kinematics import ControlKinematics
 from camcomp.model.motion.node_pieces import Pieces, Places, cut
 from camcomp.model.motion.timeline import Timeline
 from camcomp.model.seams import Seams
@@ -202,23 +203,16 @@ def _between(values, before, share, out):  # type: ignore[no-untyped-def]  # pra
 
 
 def path_of_program(
+    machine: ControlKinematics,
     name: str,
     timeline: Timeline,
     track: Track,
     time: Floats,
     *,
     started: float,
-    to_machine: Callable[[Floats], Floats],
-    vectors: Callable[[Floats], Floats],
-    inverse: Callable[[Floats, Floats | None], Floats],
-    platform: Callable[[Path, Ints, Floats], Floats | None] | None = None,
     temperature: Floats | None = None,
 ) -> RunPath:
-    """Run path of a program's feed motions on its own timeline, with the loads of `track`.
-
-    to_machine: tips (q, 3) program -> machine frame; vectors: the same for vectors. inverse: machine tips (q, 3) and
-    rotations (q, 3, 3) -> set-points (q, m). platform: rotations (q, 3, 3) at fractions (q,) of motions (q,) of a path.
-    """
+    """Run path of a program's feed motions on its own timeline, with the loads of `track`."""
     rank = np.full(len(timeline.path), -1)
     rank[timeline.index] = np.arange(len(timeline.index))
     own = np.flatnonzero((rank[track.motion] >= 0) & (track.length > 0.0))
@@ -227,12 +221,12 @@ def path_of_program(
     piece, w = pieces.nodes()
     share = pieces.share(piece, w)
     motion = timeline.index[pieces.motion[piece]]
-    tip = to_machine(path_geometry.points(timeline.path, motion, share))
-    rotation = None if platform is None else platform(timeline.path, motion, share)
-    rho = inverse(tip, rotation)
+    tip = machine.to_machine(path_geometry.points(timeline.path, motion, share))
+    rotation = machine.platform(timeline.path, motion, share)
+    rho = machine.inverse(tip, rotation)
     of_track = own[part][piece]
     within = (share - track.u0[of_track]) / (track.u1[of_track] - track.u0[of_track])
-    load = vectors(track.force(of_track, np.clip(within, 0.0, 1.0)))
+    load = machine.vectors(track.force(of_track, np.clip(within, 0.0, 1.0)))
 
     def place(at: Floats) -> Places:
         return pieces.at(*timeline.locate(at))

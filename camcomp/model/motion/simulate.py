@@ -60,8 +60,8 @@ def simulate(
     track = lay_track(path, conditions, engaged if cutting else None)
     progress.done(0.1)
     run_path = path_of_program(
-        "simulation", timeline, track, time, started=started_s, to_machine=twin.to_machine,
-        vectors=job.frame.vectors, inverse=twin.inverse, platform=twin.platform, temperature=None if warm is None else np.full(len(time), warm),
+        twin, "simulation", timeline, track, time, started=started_s,
+        temperature=None if warm is None else np.full(len(time), warm),
     )  # fmt: skip
     with progress.part(0.3, 0.7, points=True):
         _, solved = twin.sense(run_path)

@@ -114,10 +114,7 @@ class Twin(ControlKinematics):
         causes = (*self.causes, *causes)
         # control, drive
         robot, key = self.edited(causes)
-        grid, near, rows = self._motions(run_path, causes)
-        if robot is not self.robot:
-            springs = signal_path.springs(robot)
-            grid, near, rows = (replace(each, stiffness=springs) for each in (grid, near, rows))
+        grid, near, rows = self._motions(run_path, causes, robot)
         seen = run_path.time if run_path.led else signal_path.clock(causes, run_path.tip_time)
         late = seen is not run_path.time
         stated = not late or seen is run_path.tip_time
@@ -130,64 +127,57 @@ class Twin(ControlKinematics):
         )
         alone = slopes is not None and stated and signal_path.momentary(causes)
         path, drives = (run_path.around_rows, near) if alone else (run_path, grid)
-        drives = replace(drives, held=lambda: path.grid_place.of(held()))
-        error, guided = signal_path.driven(causes, self.actuators, drives)
-        effort = signal_path.drive_forces(causes, self.actuators, guided)
-        carriage = drives.encoder + error if error.any() else drives.encoder
-        encoder = rows.encoder
-        ahead = None
-        if measured is not None:
-            ahead = np.where(np.isfinite(measured), measured - encoder, 0.0)
+        gap, effort = self._driven(path, replace(drives, held=lambda: path.grid_place.of(held())), causes)
+        ahead = None if measured is None else np.where(np.isfinite(measured), measured - rows.encoder, 0.0)
         at_tip = rows
         if late:
             at_tip = replace(
                 _at(run_path, grid, seen, None), told=lambda: self._told(run_path, run_path.place(seen), seen)
             )
-        moved = carriage is not path.grid_rho
-        gap = carriage - path.grid_rho if moved else None  # carriage minus set-point
         gap_row = _gap_at(path, run_path.time, gap, ahead)
         gap_tip = _gap_at(path, seen, gap, ahead) if late else gap_row
         place = run_path.row_place
         place_tip = place if not late else run_path.tip_place if stated else run_path.place(seen)
         # structure
         known = solved if slopes is not None else None
-        if known is None:
-            shift = _piece_means(run_path, gap) if gap is not None else np.zeros((run_path.pieces, len(self.actuators)))
-        else:
-            shift = known.shift
         load = self._node_load(run_path, grid, causes, known, key)
         if known is None or known.key != key or load is not known.load:
+            shift = _piece_means(run_path, gap, len(self.actuators)) if known is None else known.shift
             known = self.structure(
                 run_path=run_path, machine=self._machine(robot, key), key=key, shift=shift, load=load, slopes=slopes
             )
         solved = known
-        force, cut = run_path.row_force, place_tip
-        late_force = run_path.told and bool(signal_path.acting(causes, "control"))
-        if late_force:
-            behind = _lateness(run_path, grid)
-            force = run_path.forces(run_path.place(run_path.time - behind))
-            cut = run_path.place(seen - behind)
-        load = signal_path.loaded(causes, rows, force)
-        load_tip = signal_path.loaded(causes, at_tip, run_path.forces(cut)) if late else load
+        behind = _lateness(run_path, grid) if run_path.told and signal_path.acting(causes, "control") else None
+        load, load_tip = _process_loads(run_path, causes, rows, at_tip=at_tip, place_tip=place_tip, behind=behind)
         drive, tip = solved.drives(place), solved.tips(run_path, place_tip, seen)
         if slopes is not None:
-            usual = not (late_force or signal_path.acting(causes, "process"))
-            soft = solved.softer
-            drive = slopes.drives(place).behind(
-                drive, place, solved, gap_row, load, usual=usual, softer=None if soft is None else soft.drive
-            )
+            usual = behind is None and not signal_path.acting(causes, "process")
+            drive_softer, tip_softer = (solved.softer.drive, solved.softer.tip) if solved.softer else (None, None)
+            drive = slopes.drives(place).behind(drive, place, solved, gap_row, load, usual=usual, softer=drive_softer)
             tip = slopes.tips(place_tip).behind(
-                tip, place_tip, solved, gap_tip, load_tip, usual=usual, softer=None if soft is None else soft.tip
+                tip, place_tip, solved, gap_tip, load_tip, usual=usual, softer=tip_softer
             )
         if effort is not None:
             drive = drive + path.between(effort, run_path.time)
-        # tool, workpiece, sensor
-        length = signal_path.grown(causes, self.actuators, at_tip)
-        tip = tip if length is None else tip + self._longer.way(run_path, place_tip, length)
-        tip = signal_path.led(causes, tip, at_tip, self.nominal, self.origin)
-        tip = self.to_program(signal_path.posed(causes, tip, load_tip, at_tip))
-        tip = signal_path.placed(causes, signal_path.clamped(causes, tip), load_tip, at_tip)
-        return signal_path.read(causes, Reading(tip, encoder, drive, load.force, rows), rows), solved
+        tip = self._on_workpiece(run_path, causes, tip, load=load_tip, motion=at_tip, place=place_tip)
+        return signal_path.read(causes, Reading(tip, rows.encoder, drive, load.force, rows), rows), solved
+
+    def _driven(self, path: RunPath, motion: Motion, causes: Sequence[Cause]) -> tuple[Floats | None, Floats | None]:
+        """Carriages minus set-points (g, m) on the grid of a path, and additional drive forces (g, m); None: zero."""
+        error, guided = signal_path.driven(causes, self.actuators, motion)
+        carriage = motion.encoder + error if error.any() else motion.encoder
+        gap = None if carriage is path.grid_rho else carriage - path.grid_rho
+        return gap, signal_path.drive_forces(causes, self.actuators, guided)
+
+    def _on_workpiece(
+        self, run_path: RunPath, causes: Sequence[Cause], tip: Floats, load: Load, motion: Motion, place: Places
+    ) -> Floats:
+        """Tips (n, 3), program frame, behind tool and workpiece; tip (n, 3): of the loaded structure, machine frame."""
+        length = signal_path.grown(causes, self.actuators, motion)
+        tip = tip if length is None else tip + self._longer.way(run_path, place, length)
+        tip = signal_path.led(causes, tip, motion, self.nominal, self.origin)
+        tip = self.to_program(signal_path.posed(causes, tip, load, motion))
+        return signal_path.placed(causes, signal_path.clamped(causes, tip), load, motion)
 
     def _node_load(
         self, run_path: RunPath, grid: Motion, causes: Sequence[Cause], known: Solved | None, key: tuple[Any, ...]
@@ -336,16 +326,20 @@ class Twin(ControlKinematics):
             self._machines[key] = build_machine(robot, self.nominal)
         return self._machines[key]
 
-    def _motions(self, run_path: RunPath, causes: Sequence[Cause]) -> tuple[Motion, Motion, Motion]:
+    def _motions(self, run_path: RunPath, causes: Sequence[Cause], robot: Robot) -> tuple[Motion, Motion, Motion]:
         """Motion on the fine grid, on the grid around the rows, and at the rows; cached for causes without servo hooks."""
         servo = signal_path.acting(causes, "control")
-        if not servo and run_path in self._usual:
-            return self._usual[run_path]
-        grid = self._grid_motion(run_path, servo)
-        motions = grid, _around_rows(run_path, grid), _at(run_path, grid, run_path.time, run_path.row_rho)
-        if not servo:
-            self._usual[run_path] = motions
-        return motions
+        if servo or run_path not in self._usual:
+            grid = self._grid_motion(run_path, servo)
+            motions = grid, _around_rows(run_path, grid), _at(run_path, grid, run_path.time, run_path.row_rho)
+            if not servo:
+                self._usual[run_path] = motions
+        else:
+            motions = self._usual[run_path]
+        if robot is self.robot:
+            return motions
+        grid, near, rows = (replace(each, stiffness=signal_path.springs(robot)) for each in motions)
+        return grid, near, rows
 
     def _grid_motion(self, run_path: RunPath, servo: Sequence[Cause]) -> Motion:
         home = np.array([a.home for a in self.robot.actuators])
@@ -420,8 +414,25 @@ def _gap_at(run_path: RunPath, at: Floats, gap: Floats | None, ahead: Floats | N
     return own if ahead is None else own + ahead
 
 
-def _piece_means(run_path: RunPath, gap: Floats) -> Floats:
-    """Mean (pieces, m) of grid values (g, m) over each piece."""
+def _process_loads(
+    run_path: RunPath, causes: Sequence[Cause], rows: Motion, at_tip: Motion, place_tip: Places, behind: Floats | None
+) -> tuple[Load, Load]:
+    """Loads at the rows and at the instants of the tip readings.
+
+    behind (n,) s: lateness of the loops by which the force of the set-points acts late; None: it acts at once.
+    """
+    force, cut = run_path.row_force, place_tip
+    if behind is not None:
+        force = run_path.forces(run_path.place(run_path.time - behind))
+        cut = run_path.place(at_tip.time - behind)
+    load = signal_path.loaded(causes, rows, force)
+    return load, load if at_tip is rows else signal_path.loaded(causes, at_tip, run_path.forces(cut))
+
+
+def _piece_means(run_path: RunPath, gap: Floats | None, actuators: int) -> Floats:
+    """Mean (pieces, m) of grid values (g, m) over each piece; zero without values."""
+    if gap is None:
+        return np.zeros((run_path.pieces, actuators))
     count = np.bincount(run_path.grid_piece, minlength=run_path.pieces)
     total = np.column_stack([np.bincount(run_path.grid_piece, each, run_path.pieces) for each in gap.T])
     return total / np.maximum(count, 1)[:, None]

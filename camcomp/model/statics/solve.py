@@ -111,16 +111,10 @@ def solve(
     tip, wrench (n, 6) at the platform reference. rho (n, m) commanded in FREE, HOLD and CLAMP; default: the set-points of
     `near`. check: verify stability.
     """
-    near = np.ascontiguousarray(near, float)
     n, m = len(near), len(machine.actuators)
     tool = np.ascontiguousarray(machine.robot.tool, float)
-    aim = near if aim is None else np.ascontiguousarray(aim, float)
-    R_aim = _per_point(machine.nominal.held_rotation if aim_rotation is None else aim_rotation, n, (3, 3))
-    # a clamped pose may be out of reach of the rigid machine
-    R_near = _per_point(machine.nominal.held_rotation, n, (3, 3)) if mode == CLAMP else R_aim
-    # the controller aims with its own tool length; the kernels have one tool, the true one
-    longer = tool - machine.nominal.tool
-    near = near + R_near @ longer
+    aim = np.ascontiguousarray(near if aim is None else aim, float)
+    near, R_near, R_aim = _starts_and_aims(machine, mode, near, aim_rotation)
     f, w = _per_point(force, n, (3,)), _per_point(wrench, n, (6,))
     r = np.zeros((n, m)) if rho is None else np.array(rho, float).reshape(n, m)
     nominal, drive, tip, total = (np.full((n, k), np.nan) for k in (m, m, 3, 6))
@@ -150,21 +144,24 @@ def solve(
     f0 = machine.elastic.chain[:, SPRINGS]
     F = np.stack([kept[:, c, k : k + 6] for c, k in enumerate(f0)], axis=1)
     return State(
-        tip=tip,
-        rotation=R,
-        tilt=tilt,
-        commanded=commanded,
-        rho=r,
-        rho_nominal=nominal,
-        drive=drive,
-        force=f,
-        status=status,
-        passes=passes,
-        x=kept,
-        F=F,
-        commanded_rotation=R_cmd,
-        wrench=total,
-    )
+        tip=tip, rotation=R, tilt=tilt, commanded=commanded, rho=r, rho_nominal=nominal, drive=drive, force=f,
+        status=status, passes=passes, x=kept, F=F, commanded_rotation=R_cmd, wrench=total,
+    )  # fmt: skip
+
+
+def _starts_and_aims(
+    machine: Machine, mode: int, near: Array, aim_rotation: Array | None
+) -> tuple[Array, Array, Array]:
+    """Tips (n, 3) and orientations (n, 3, 3) that start the solver, and the orientations (n, 3, 3) aimed at.
+
+    The controller aims with its own tool length; the kernels have one tool, the true one.
+    """
+    held = machine.nominal.held_rotation
+    R_aim = _per_point(held if aim_rotation is None else aim_rotation, len(near), (3, 3))
+    # a clamped pose may be out of reach of the rigid machine
+    R_near = _per_point(held, len(near), (3, 3)) if mode == CLAMP else R_aim
+    longer = np.ascontiguousarray(machine.robot.tool, float) - machine.nominal.tool
+    return np.ascontiguousarray(near, float) + R_near @ longer, R_near, R_aim
 
 
 def inverse(machine: Machine, tip: Array, rotation: Array | None = None) -> Array:

@@ -13,7 +13,9 @@ from camcomp.terminal.commands._options import OUTPUT, dialect_option, findings_
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
-    from camcomp.api.machine import StockChoice
+    from camcomp.api.machine import Program, StockChoice
+    from camcomp.compensation.program.result import LineResult
+    from camcomp.compensation.program.verify import Verified
 
 
 @click.command()
@@ -46,7 +48,6 @@ def command(
 
     machine = load_machine(*configs)
     tolerance = tolerance_um or machine.config.compensation.tolerance_um
-    inputs = (corrected, original, *configs)
     findings: list[Finding] = []
     outputs: dict[str, bytes] = {}
     failure: CamcompError | None = None
@@ -58,42 +59,39 @@ def command(
         figures = done.figures(tolerance)
         if json_file:
             outputs[json_file] = figures.to_json()
-        worst = figures.residual.max_um
-        note = f"residual rms {figures.residual.rms_um:.3f} um, max {worst:.3f} um at {figures.points} points"
-        say(f"{note}; {done.joining} joining lines not counted", quiet=quiet)
-        for each in sorted(done.lines, key=lambda e: -e.residual_um)[:10]:
-            say(
-                f"  line {each.line}: {each.residual_um:.3f} um in {each.moves} moves (vertex {each.vertex_um:.3f}, "
-                f"chord +{each.chord_um:.3f}, rounding <= {each.rounding_um:.3f}, solver {each.convergence_um:.3f})",
-                quiet=quiet,
-            )
-        for each_warning in done.warnings:
-            say(f"warning: {each_warning}", quiet=quiet)
-        say(controller_line(figures), quiet=quiet)
-        say(*expected_error_lines(figures), quiet=quiet)
-        over, worst = [each for each in done.lines if each.judged_um > tolerance], done.worst_um
-        if not worst <= tolerance * (1.0 + 1e-9):
+        size = figures.residual
+        note = f"residual rms {size.rms_um:.3f} um, max {size.max_um:.3f} um at {figures.points} points"
+        say(f"{note}; {done.joining} joining lines not counted", *_lines_of(done), quiet=quiet)
+        say(controller_line(figures), *expected_error_lines(figures), quiet=quiet)
+        if not done.worst_um <= tolerance * (1.0 + 1e-9):
+            over = [each for each in done.lines if each.judged_um > tolerance]
             lines = ", ".join(str(each.line) for each in over)
-            text = f"{worst:.3f} um are left, more than {tolerance:g} um, at source lines {lines}"
+            text = f"{done.worst_um:.3f} um are left, more than {tolerance:g} um, at source lines {lines}"
             failure = CheckFailed("CC601", text)
-            for each in over:
-                at = source.text.place(each.line - 1, 0)
-                text = f"{each.judged_um:.3f} um are left, more than {tolerance:g} um"
-                findings.append(
-                    Finding(
-                        rule="CC601",
-                        message=text,
-                        file=at.file,
-                        line=at.line,
-                        column=at.column,
-                        source=at.source,
-                        check=True,
-                    )
-                )
+            findings = [_finding(each, source, tolerance) for each in over]
     except CamcompError as error:
         failure, findings = error, findings_of(error, display_name(corrected))
     case = Case(display_name(corrected), findings, note)
     outputs |= findings_files("verify", [case], sarif_file=sarif_file, junit_file=junit_file)
-    write_all(outputs, inputs=inputs)
+    write_all(outputs, inputs=(corrected, original, *configs))
     if failure is not None:
         raise failure
+
+
+def _lines_of(done: "Verified") -> list[str]:
+    """Text for the terminal: the ten worst source lines, and warnings."""
+    worst = [
+        f"  line {each.line}: {each.residual_um:.3f} um in {each.moves} moves (vertex {each.vertex_um:.3f}, "
+        f"chord +{each.chord_um:.3f}, rounding <= {each.rounding_um:.3f}, solver {each.convergence_um:.3f})"
+        for each in sorted(done.lines, key=lambda e: -e.residual_um)[:10]
+    ]
+    return worst + [f"warning: {each}" for each in done.warnings]
+
+
+def _finding(line: "LineResult", source: "Program", tolerance: float) -> Finding:
+    """The failed check of a source line, with its place in the original program."""
+    at = source.text.place(line.line - 1, 0)
+    return Finding(
+        rule="CC601", message=f"{line.judged_um:.3f} um are left, more than {tolerance:g} um", file=at.file, line=at.line,
+        column=at.column, source=at.source, check=True,
+    )  # fmt: skip

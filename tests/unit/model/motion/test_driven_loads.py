@@ -46,10 +46,7 @@ def a_run(job):
     n = len(time)
     forces = Forces(FORCE_N * (0.3 * along + across), np.zeros((n, 3)), np.ones(n, bool), np.zeros(n - 1, bool))
     rho = twin.inverse(twin.to_machine(tip))
-    return twin, driven_path(
-        "run", time, rho, tip, forces, started=0.0, to_machine=twin.to_machine, vectors=job.frame.vectors,
-        inverse=twin.inverse,
-    )  # fmt: skip
+    return twin, driven_path(twin, "run", time=time, rho=rho, tip=tip, forces=forces, started=0.0)
 
 
 def at_every_row(twin, run_path, causes):

@@ -32,10 +32,8 @@ def job():
 def a_run(job):
     twin, path = twin_of(job), read_program(PROGRAM, name="run").path
     timeline = schedule(path, job.config.control.acceleration_mm_per_s2)
-    return path_of_program(
-        "run", timeline, lay_track(path, job.conditions), np.arange(0.0, timeline.end, 0.02), started=0.0,
-        to_machine=twin.to_machine, vectors=job.frame.vectors, inverse=twin.inverse,
-    )  # fmt: skip
+    track, time = lay_track(path, job.conditions), np.arange(0.0, timeline.end, 0.02)
+    return path_of_program(twin, "run", timeline, track, time, started=0.0)
 
 
 def changed(twin, robot, causes=()):
