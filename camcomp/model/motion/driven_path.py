@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
@@ -19,10 +20,12 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.orientation import rotation_vectors, rotations_about
 from camcomp.model.cutting.track import Track
 from camcomp.model.motion.alignment import Aligned
-from camcomp.model.motion.control_kinematics import ControlKinematics
 from camcomp.model.motion.driven_pieces import DrivenPieces, near_largest_change, node_loads
 from camcomp.model.motion.run_path import MOST_STEPS, STEP_S, Driven, RunPath, moving
 from camcomp.model.seams import Seams, missing_rows
+
+if TYPE_CHECKING:
+    from camcomp.model.motion.control_kinematics import ControlKinematics
 
 CLOCK_S = 0.010  # largest offset between the clocks of tip measurement and controller
 _JUMP_SHARE = 0.1  # of the largest force: a change from row to row above it is a jump, not the turn of an arc

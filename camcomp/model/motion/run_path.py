@@ -1,8 +1,11 @@
 """Run path of the twin: set-points of one run over time, and the positions of log rows between its nodes."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,10 +14,12 @@ from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import direction
-from camcomp.model.motion.control_kinematics import ControlKinematics
 from camcomp.model.motion.node_pieces import Pieces, Places, cut
 from camcomp.model.motion.timeline import Timeline
 from camcomp.model.seams import Seams
+
+if TYPE_CHECKING:
+    from camcomp.model.motion.control_kinematics import ControlKinematics
 
 STEP_S = 0.001  # time grid of elements with memory: 0.2 um of interpolation error at 1500 mm/s2
 MOST_STEPS = 40000
@@ -111,7 +116,7 @@ class RunPath:
         return np.unique(np.concatenate([before, before + 1]))
 
     @cached_property
-    def around_rows(self) -> "RunPath":
+    def around_rows(self) -> RunPath:
         """This run reduced to the instants `near_rows`; unchanged where they are most of the grid."""
         if not self.ordered or len(self.near_rows) > _FEW * len(self.grid):
             return self
