@@ -1,29 +1,45 @@
-"""Runs camcomp as a user does, in a process of its own, and reads what it wrote."""
+"""Runs camcomp's command line and reads what it wrote."""
 
 import csv
+import io
 import json
-import os
-import subprocess
-import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pytest
+
+from camcomp.ground import notes
+from camcomp.terminal.cli import run
 
 ROOT = Path(__file__).parent.parent
 
 
-def camcomp(*words, cwd=None, stdin=b""):
-    """The finished process of one command line; output captured as bytes."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-m", "camcomp", *map(str, words)],
-        input=stdin,
-        capture_output=True,
-        cwd=cwd or ROOT,
-        env=environment,
-        timeout=300,
-        check=False,
-    )
+@dataclass
+class Ended:
+    """How a command line ended: exit code, output and messages."""
+
+    returncode: int
+    stdout: bytes
+    stderr: bytes
+
+
+def camcomp(*words, cwd=None, stdin=b"", together=False):
+    """Run one command line in this process, which saves the start of another one, with standard streams of its own.
+
+    together: messages are part of the output, in the order of writing.
+    """
+    streams = {name: io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for name in ("stdout", "stderr")}
+    if together:
+        streams["stderr"] = streams["stdout"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(cwd or ROOT)
+        patch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(stdin), "utf-8"))
+        for name, stream in streams.items():
+            patch.setattr(f"sys.{name}", stream)
+        patch.setattr(notes, "_told", set())
+        code = run([str(each) for each in words])
+    return Ended(code, **{name: stream.buffer.getvalue() for name, stream in streams.items()})
 
 
 def table(path):

@@ -1,20 +1,22 @@
 """Runs a Markdown document as a reader would: files are typed in, commands are given, and what is promised is compared.
 
-A block with `title=NAME` is a file. In a ```console block a line `$ command` is run by bash; the lines below it are what it
-must print, in order, `...` standing for anything within a line or for any number of lines. `# exit N` behind a command is
-the exit code that it must end with, else 0.
+A block with `title=NAME` is a file. In a ```console block a line `$ command` is run: a call of camcomp in this process,
+anything else by bash. The lines below it are what it must print, in order, `...` standing for anything within a line or for
+any number of lines. `# exit N` behind a command is the exit code that it must end with, else 0.
 """
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from dataclasses import dataclass, field
-from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
+from tests.commandline import ROOT, camcomp
+
 # what a run writes every 10 s, which a document does not show
 _PROGRESS = re.compile(r"^[^\n]+: (?:\d+ %, about [^\n]* left|[^\n]* so far)\n", re.MULTILINE)
+_OF_A_SHELL = re.compile(r"[|&;<>$*`~]")
 _FENCE = re.compile(r"^```(\w*)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -86,6 +88,7 @@ class Reader:
 
     def __init__(self, folder, tools):
         self.folder = folder
+        self.installs = False  # packages, which other processes see
         tools.mkdir()
         script = tools / "camcomp"
         script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m camcomp "$@"\n')
@@ -109,12 +112,17 @@ class Reader:
 
     def give(self, command):
         """Run a command; what it printed, errors included, in the order of writing, without lines of progress."""
-        done = subprocess.run(
-            ["bash", "-eo", "pipefail", "-c", command.text], check=False, cwd=self.folder, env=self.environment,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=600,
-        )  # fmt: skip
-        assert done.returncode == command.code, f"line {command.line}: `{command.text}`\n{done.stdout}"
-        return _PROGRESS.sub("", done.stdout)
+        self.installs |= command.text.startswith("pip ")
+        if command.text.startswith("camcomp ") and not self.installs and not _OF_A_SHELL.search(command.text):
+            done = camcomp(*shlex.split(command.text)[1:], cwd=self.folder, together=True)
+        else:
+            done = subprocess.run(
+                ["bash", "-eo", "pipefail", "-c", command.text], check=False, cwd=self.folder, env=self.environment,
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=600,
+            )  # fmt: skip
+        printed = done.stdout.decode()
+        assert done.returncode == command.code, f"line {command.line}: `{command.text}`\n{printed}"
+        return _PROGRESS.sub("", printed)
 
     def follow(self, document, skip=lambda text: False):
         """Do everything that a document says."""

@@ -30,7 +30,9 @@ def main():
         coverage.json_report(outfile=str(path))
         found = json.loads(path.read_text())
     totals = found["totals"]
-    of = "all tests" if sys.version_info >= (3, 12) else "the first test of every file"  # see tests/conftest.py
+    of = (
+        "all tests" if sys.version_info >= (3, 12) else "the first test of every file of tests/unit"
+    )  # see tests/conftest.py
     print(f"{of} ran {totals['percent_covered']:.1f} % of {totals['num_statements']} statements")
     print("modules that none of them reached:", ", ".join(modules(found["files"])) or "none")
 

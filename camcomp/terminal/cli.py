@@ -108,7 +108,10 @@ def _send_again(dropped: "sys.UnraisableHookArgs") -> None:
     number = error.number if isinstance(error, Terminated) else signal.SIGINT
     again = Timer(SOON_S, _interrupt, (number,))
     again.daemon = True
-    again.start()
+    try:
+        again.start()  # which waits for the thread
+    except (KeyboardInterrupt, Terminated):  # the repetition came while this hook was still running
+        _send_again(dropped)
 
 
 def _interrupt(number: signal.Signals) -> None:

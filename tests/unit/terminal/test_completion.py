@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 
 CASES = [
@@ -25,28 +26,40 @@ CASES = [
 ]
 
 
-def offered(shell, words):
-    """(kind, value) of what is offered."""
+def asked(shell, words):
+    """Variables by which a shell asks what it may offer."""
     whole = ["camcomp", *words]
-    asked = {"COMP_WORDS": " ".join(whole), "COMP_CWORD": str(len(words)), "_CAMCOMP_COMPLETE": f"{shell}_complete"}
+    found = {"COMP_WORDS": " ".join(whole), "COMP_CWORD": str(len(words)), "_CAMCOMP_COMPLETE": f"{shell}_complete"}
     if shell == "fish":
-        asked |= {"COMP_WORDS": " ".join(whole[:-1]), "COMP_CWORD": words[-1]}
-    done = subprocess.run(
-        [sys.executable, "-c", "from camcomp.terminal.cli import main; main()"], capture_output=True, text=True, check=True,
-        env={**os.environ, **asked, "PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
-    lines = done.stdout.splitlines()
+        found |= {"COMP_WORDS": " ".join(whole[:-1]), "COMP_CWORD": words[-1]}
+    return found
+
+
+def offered(shell, printed):
+    """(kind, value) of what is offered."""
+    lines = printed.splitlines()
     if shell == "zsh":
         return list(zip(lines[::3], lines[1::3], strict=True))
     return [tuple(line.split("\t")[0].split(",", 1)) for line in lines]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_every_shell_is_offered_files_and_names(shell):
+def test_every_shell_is_offered_files_and_names(shell, monkeypatch, capsys):
     for words, wanted in CASES:
-        found = offered(shell, words)
+        for name, value in asked(shell, words).items():
+            monkeypatch.setenv(name, value)
+        assert run([]) == 0
+        found = offered(shell, capsys.readouterr().out)
         if wanted in ("file", "dir"):
             assert [kind for kind, _ in found] == [wanted], words
         else:
             assert ("plain", wanted) in found, words
             assert all(value.lower().startswith(words[-1].lower()) for _, value in found), words
+
+
+def test_a_process_answers_a_shell():
+    done = subprocess.run(
+        [sys.executable, "-m", "camcomp"], capture_output=True, text=True, check=True,
+        env={**os.environ, **asked("bash", ["comp"]), "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert ("plain", "compensate") in offered("bash", done.stdout)
