@@ -99,3 +99,45 @@ def test_stated_friction_holds_the_carriage_against_what_is_less():
     np.testing.assert_allclose(
         moved(THERE_AND_BACK, held, np.array([50.0]), width_rad=0.2), [-0.1, -0.1, -0.1, 0.1, 0.1]
     )
+
+
+def led(encoder, load, friction, width):
+    """Where a nut stands (n,) behind its encoder (n,): load (n,) beyond the friction pushes it to its flank, else it is carried."""
+    out, at = np.empty_like(encoder), encoder[0]
+    for k, here in enumerate(encoder):
+        at = min(max(at, here - 0.5 * width), here + 0.5 * width)
+        if abs(load[k]) > friction:
+            at = here + 0.5 * width * np.sign(load[k])
+        out[k] = at
+    return out
+
+
+def test_a_slide_that_its_load_pushes_ahead_of_its_friction(tmp_path):
+    """Guides hold 150 N, the load reaches 313 N: twice around the groove it pushes the carriage ahead of its drive."""
+    plant, friction, width, y = MACHINES["orthoglide"], 150.0, 0.04, 1
+    entries = [
+        {"effect": "friction", "target": "y", "force_N": friction, "presliding_mm": 0.0028},
+        {"effect": "backlash", "target": "y", "width_mm": width},
+    ]
+    (tmp_path / "effects.yaml").write_text(json.dumps({"effects": entries}))
+    (tmp_path / "in.nc").write_text("G21 G90\nG0 X25 Y0 Z4\nG1 Z0 F300\nG3 X25 Y0 I-25 J0 F1200\nG0 Z20\nM30\n")
+    words = ["--config", str(plant.config), "--config", str(tmp_path / "effects.yaml")]
+    asked = [str(tmp_path / "in.nc"), *words, "-o", str(tmp_path / "out.nc"), "--joints", str(tmp_path / "j.csv")]
+    code, said = invoke(["compensate", *asked])
+    assert code == 0, said
+    found = table(tmp_path / "j.csv")
+    joints, force = (
+        columns(tmp_path / "j.csv", "act_{}_mm", plant.actuators),
+        columns(tmp_path / "j.csv", "f{}_N", "xyz"),
+    )
+    load = -plant.settle(Faults([]), joints, force)[1][:, y]
+    nut = led(joints[:, y], load, friction, width)
+    sense = np.sign(np.diff(nut, prepend=nut[0] - 1.0))
+    turned = np.maximum.accumulate(np.where(np.diff(sense, prepend=0.0) != 0.0, np.arange(len(nut)), 0))
+    sliding = np.abs(nut - nut[turned]) > 0.1
+    joints[:, y] = nut - sense * friction / plant.drive_N_per_mm[y]
+    tip = plant.settle(Faults([]), joints, force)[0] - plant.origin
+    off = 1e3 * np.linalg.norm(tip - columns(tmp_path / "j.csv", "{}_mm", "xyz"), axis=1)
+    judged = (found["line"] == 4) & sliding & (np.abs(np.abs(load) - friction) > 2.0)
+    assert judged.sum() > 100 and (np.abs(load[judged]) > friction).any() and (np.abs(load[judged]) < friction).any()
+    assert off[judged].max() < 1.2

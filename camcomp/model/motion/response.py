@@ -367,13 +367,22 @@ def gives_way(job: Job) -> bool:
 def load_flanks(job: Job, found: Correction, travel: Travel) -> tuple[Floats, Bools]:
     """Carriage minus encoder (n, m) on the flanks to which loads push carriages, 0 where none does, and a mask (n,) of stable rows.
 
-    A row is unstable where the load has another sign at the encoder, a play away from the carriage.
+    A row is unstable where the load at the encoder, a play away from the carriage, holds the carriage on another flank. With
+    friction behind the play the encoder may lie on either side of the carriage, by the play and by the wind-up.
     """
     motion = _motion(job, found.rho, travel)
     flank = _on_flanks(job, motion, found.drive)
-    ahead = replace(motion, encoder=found.rho - SURELY * flank)
-    held = _held(job, found.commanded, ahead, travel)
-    return flank, np.asarray((_on_flanks(job, ahead, held) * flank >= 0.0).all(axis=1))
+    half = _on_flanks(job, motion, np.full_like(found.drive, np.finfo(float).max))
+    poses = [replace(motion, ordered=False, direction=np.full_like(flank, each)) for each in (0.0, 1.0)]
+    wound = _drive_errors(job, poses[1]) - _drive_errors(job, poses[0])
+    rubs = wound.any() or half[flank == 0.0].any()
+    lost = [s * half + t * wound for s in (1.0, -1.0) for t in (1.0, -1.0)] if rubs else [flank]
+    stable = np.ones(len(flank), np.bool_)
+    for each in lost:
+        ahead = replace(motion, encoder=found.rho - SURELY * each)
+        held = _held(job, found.commanded, ahead, travel)
+        stable &= (_on_flanks(job, ahead, held) == flank).all(axis=1)
+    return flank, stable
 
 
 def _on_flanks(job: Job, motion: Motion, drive: Floats) -> Floats:
