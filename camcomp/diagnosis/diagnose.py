@@ -46,10 +46,9 @@ from camcomp.diagnosis.result.types import (
     Where,
 )
 from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
-from camcomp.diagnosis.search.established import LEAST_PROBABILITY
 from camcomp.diagnosis.search.indistinguishable import classes, likeness
 from camcomp.diagnosis.search.kept_causes import ROWS_OF_AN_INSTANT
-from camcomp.diagnosis.search.unexplained import size_um, worst
+from camcomp.diagnosis.search.unexplained import worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
@@ -153,9 +152,7 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
     best = found.verdict.best
     close = [best, *sorted(found.verdict.rivals, key=lambda j: -found.probability[j])[:RIVALS]]
     if len(close) == 1:
-        close += [j for j in np.argsort(-found.probability) if j != best and found.probability[j] > LEAST_PROBABILITY][
-            :3
-        ]
+        close += [j for j in np.argsort(-found.probability) if j != best][:3]
     p = found.probability[close]
     if found.verdict.rivals:
         p = np.maximum(p, UNTESTED * p.max())  # alike by construction: their prior is no reason to leave them untested
@@ -175,7 +172,7 @@ def _set_name(problem: Problem, f: Fitted) -> str:
 
 def _energies(problem: Problem, f: Fitted) -> list[float]:
     """What each member moves the tip by, um squared."""
-    return [size_um(problem, f, (i,)) ** 2 for i in f.members]
+    return [problem.moved_um(f, (i,)) ** 2 for i in f.members]
 
 
 def _unknown_energy(found: CauseSearch) -> float:

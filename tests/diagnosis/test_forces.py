@@ -42,21 +42,3 @@ def test_rows_in_doubt_may_err_by_it_together(doubtful, elsewhere, shows):
     )
     found = unexplained_of(problem, "tip", [left])
     assert (found.z > 5.0) == shows and (found.excess_um > 3.5) == shows
-
-
-@pytest.mark.parametrize("swing_um", [0.0, 20.0])
-def test_what_swings_faster_than_blocks_of_rows_is_left_as_well(swing_um):
-    """Nine turns in sixteen rows: any mean over eight of them is next to nothing."""
-    left = np.random.default_rng(4).normal(0.0, 3e-3, (600, 3))
-    left[:, 1] += 1e-3 * swing_um * np.sin(2.0 * np.pi * 9.0 / 16.0 * np.arange(600))
-    problem = SimpleNamespace(
-        times=[np.arange(600) * 0.05], inflate=[np.ones((600, 9))], floor=SimpleNamespace(slow_mm=1e-4, axis_mm=3e-3),
-        late_drives=[np.ones((600, 3))],
-    )  # fmt: skip
-    for kind in ("tip", "encoder"):
-        found = unexplained_of(problem, kind, [left])
-        if swing_um:
-            assert found.z > 5.0 and found.excess_um == pytest.approx(swing_um / np.sqrt(2.0), rel=0.1)
-            assert np.argmax(found.energy) == 1
-        else:
-            assert found.z < 5.0

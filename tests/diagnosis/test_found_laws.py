@@ -13,11 +13,10 @@ from camcomp.diagnosis.law.answer import _base, answer_law
 from camcomp.diagnosis.law.bench_terms import Spot, Term
 from camcomp.diagnosis.law.folds import usual_split
 from camcomp.diagnosis.law.forms import at_tip
-from camcomp.diagnosis.law.joint_law import with_law
+from camcomp.diagnosis.law.joint_law import fit_needed, with_law
 from camcomp.diagnosis.law.law_answer import term_bench
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.law.shapes import Shapes
-from camcomp.diagnosis.search.established import standing
 from camcomp.ground import shelf
 from camcomp.model.effect import Cause
 from camcomp.model.law.covariates import AT_DRIVE
@@ -76,7 +75,7 @@ def test_a_drive_that_another_drives_load_moves_is_told_so_and_its_spring_not_bl
     truth, files = driven(tmp_path, machine, Fault("crosstalk", target, {"size": size, "place_mm": 0.0}))
     causes = [CandidateCause("drive_stiffness", at, shelf.load("effects", "drive_stiffness")) for at in truth.actuators]
     problem = open_problem(Bench(twin=files.twin, runs=files.runs), causes, 0.003)
-    answer = answer_law(problem, standing(problem, (truth.actuators.index(target),)), "tip")
+    answer = answer_law(problem, fit_needed(problem, (truth.actuators.index(target),)), "tip")
     assert answer.fit.members == ()  # the law tells it better than the spring
     (found,) = answer.law.terms
     assert (found.term, found.unit) == (f"drive {target}: {term}", unit)
@@ -108,12 +107,12 @@ def test_a_cause_that_followed_a_law_goes_once_it_is_known_and_another_stays(tmp
         for name, at in [("thermal_growth", "x"), ("screw_pitch", "y")]
     ]
     problem = open_problem(Bench(twin=files.twin, runs=files.runs), causes, 0.003)
-    assert standing(problem, (0, 1)).members == (0, 1)
+    assert fit_needed(problem, (0, 1)).members == (0, 1)
     bench, spot = term_bench(problem), Spot("structure", 0)
     forms = [f for f in at_tip(bench.sizes(spot)) if f.family == "settling" and "force_N" in f.about]
     values = bench.values(spot, forms[1])
     law = SimpleNamespace(precision=np.full(2, 1.0), columns=(bench.white(spot, values),))
-    f = standing(with_law(problem, bench, law, [(spot, values)]), (0, 1))
+    f = fit_needed(with_law(problem, bench, law, [(spot, values)]), (0, 1))
     assert f.members == (1,)
     (cause,) = problem.causes(f.members, f.theta, f.extra)
     assert cause.values["error_ppm"] == pytest.approx(300.0, abs=30.0)

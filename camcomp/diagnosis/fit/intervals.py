@@ -19,11 +19,8 @@ STATED = 0.05  # share by which stated springs and forces are off on any machine
 BLOCKS = (6, 24, 96)  # per run
 
 
-def joint_covariance(problem: Problem, f: Fitted, *, as_stated: bool = False) -> Floats:
-    """Covariance (d + s, d + s) of the members' coordinates and, behind them, of their shapes in their own units.
-
-    as_stated: of what the members do at the tip, rather than of springs and forces behind it.
-    """
+def joint_covariance(problem: Problem, f: Fitted) -> Floats:
+    """Covariance (d + s, d + s) of the members' coordinates and, behind them, of their shapes in their own units."""
     index = problem.member_columns(f.members)
     names = problem.shapes_of(f.members)
     d, s = len(index), len(names)
@@ -32,9 +29,7 @@ def joint_covariance(problem: Problem, f: Fitted, *, as_stated: bool = False) ->
     # a shape that the data do not tell is known to about a third
     reach = np.array([0.3 * f.extra[i][p.name] for i, p in names])
     G = [W.beside(D * reach) for W, D in zip(problem.white_at(f), shapes, strict=True)]
-    usual, most = problem.prior.precision(f.factor), problem.prior.reach.copy()
-    if not as_stated:
-        usual, most = _stated(problem, usual, most)
+    usual, most = _stated(problem, problem.prior.precision(f.factor), problem.prior.reach.copy())
     precision = np.concatenate([usual, np.ones(s)])
     precision[index] = 1e-2 / problem.prior.scale[index] ** 2
     M = sum((g.T @ g for g in G), np.diag(precision))
@@ -62,7 +57,7 @@ def joint_covariance(problem: Problem, f: Fitted, *, as_stated: bool = False) ->
     )
     parameters = [p for i in f.members for p in problem.columns.candidates[i].parameters]
     # of a factor it is the whole of what it multiplies that the formula is off by
-    whole = [1.0 / p.scale if p.log and not as_stated else t for p, t in zip(parameters, f.theta, strict=True)]
+    whole = [1.0 / p.scale if p.log else t for p, t in zip(parameters, f.theta, strict=True)]
     formula = np.concatenate([FORMULA * np.asarray(whole, float), np.zeros(s)])
     return np.asarray(out + np.diag(healthy**2 + formula**2), float)
 

@@ -71,6 +71,16 @@ class Problem:
         """How far (rms over the rows) some columns with coordinates theta (d,) move the tip."""
         return 1e3 * float(np.sqrt(np.maximum(theta @ self.tip_gram[np.ix_(index, index)] @ theta, 0.0)))
 
+    def moved_um(self, f: Fitted, members: Members | None = None) -> float:
+        """How far (rms over the rows) the members of a fit, or some of them, move the tip by themselves."""
+        own = self.member_columns(f.members if members is None else members)
+        index = self.member_columns(f.members)
+        return self.size_um(own, f.theta[[index.index(c) for c in own]])
+
+    def small_members(self, f: Fitted) -> Members:
+        """The members that move the tip by at most MINOR floors."""
+        return tuple(i for i in f.members if self.moved_um(f, (i,)) <= MINOR * self.floor.tip_um)
+
     @cached_property
     def late_drives(self) -> list[Floats]:
         """Per run (n, m) >= 1: how much less than its noise says an encoder tells where a late drive changed its speed unseen."""
@@ -122,9 +132,7 @@ class Problem:
         if best.grams is self.base_grams:
             return best  # so small that no law of its turning can be seen
         for i in members:
-            own = self.member_columns((i,))
-            size = self.size_um(own, best.theta[np.isin(self.member_columns(members), own)])
-            if size <= MINOR * self.floor.tip_um:
+            if i in self.small_members(best):
                 continue  # it will not be named, whatever its law
             for p in self.columns.candidates[i].switches:
                 for value in p.either:
@@ -251,17 +259,11 @@ class Problem:
 
     def theta_without(self, f: Fitted, k: int, members: Members | None = None) -> Floats:
         """The coordinates of the members, or of some of them by themselves, fitted without run k, about the fit to all runs."""
-        return self.told_without(f, k, members)[0]
-
-    def told_without(self, f: Fitted, k: int, members: Members | None = None) -> tuple[Floats, Floats]:
-        """The same, and their standard deviations."""
         members = f.members if members is None else members
         index, at = self.member_columns(members), self.member_columns(f.members)
         if len(f.grams) == 1 or not members:
-            here = np.array([at.index(c) for c in index], int)
-            return f.theta[here], np.sqrt(np.diag(f.covariance))[here]
-        mean, covariance = estimate(total(f.grams) - f.grams[k], self.prior, index, f.factor)
-        return self._bounded(members, mean[index]), np.sqrt(np.diag(covariance)[index])
+            return np.asarray(f.theta[[at.index(c) for c in index]], float)
+        return self._bounded(members, estimate(total(f.grams) - f.grams[k], self.prior, index, f.factor)[0][index])
 
     def _stacked(self, k: int, moved: Sequence[Floats | None], index: Sequence[int]) -> Floats:
         """White columns (w, d) of run k: those that were worked out anew, and the nominal ones of the others."""

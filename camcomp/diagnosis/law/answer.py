@@ -14,11 +14,10 @@ from camcomp.diagnosis.law.bench_terms import Spot, TermBench, spots
 from camcomp.diagnosis.law.describe import law_result, moved_without, terms_of
 from camcomp.diagnosis.law.find import FoundLaw, find_law
 from camcomp.diagnosis.law.folds import Folds, Split, usual_split
-from camcomp.diagnosis.law.joint_law import fit_jointly, with_law
+from camcomp.diagnosis.law.joint_law import fit_jointly, fit_needed, with_law
 from camcomp.diagnosis.law.law_answer import LawAnswer, term_bench
 from camcomp.diagnosis.law.screen import term_grids
 from camcomp.diagnosis.law.smooth import FoundMap, find_map, map_values
-from camcomp.diagnosis.search.established import standing
 from camcomp.diagnosis.search.unknown import about, firm_prior
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
@@ -71,7 +70,7 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
     if best is None or best.after > (1.0 - LEAST_SHRINKAGE) * before:
         return None
     joint = with_law(problem, bench, best.found, _terms(bench, best.found))
-    fit = standing(joint, f.members)
+    fit = fit_needed(joint, f.members)
     if best.f is not None or fit.members:  # about the values that the causes have beside it
         base = _base(problem, fit, bench, kind)(best.found.folds.split, False)
         best = _beside(problem, fit, bench, fit_jointly(best.found, base))

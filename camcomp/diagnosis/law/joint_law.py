@@ -12,7 +12,9 @@ from camcomp.diagnosis.law.bench_terms import Spot, TermBench
 from camcomp.diagnosis.law.find import FoundLaw
 from camcomp.diagnosis.law.folds import Folds
 from camcomp.diagnosis.law.smooth import FoundMap
+from camcomp.diagnosis.search.tempering import tempering
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, total
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats
 
@@ -56,3 +58,21 @@ def fit_jointly(found: FoundLaw | FoundMap, folds: Folds) -> FoundLaw | FoundMap
     if isinstance(found, FoundMap):
         return replace(found, theta=theta[0], theta_without=theta[1:], folds=folds)
     return replace(found, theta=theta[0], covariance=covariance, theta_without=theta[1:], folds=folds)
+
+
+def fit_needed(problem: Problem, members: Members) -> Fitted:
+    """The fit of the members that evidence supports and that are not small; a cause named without a law may have followed it."""
+    while members:
+        f = problem.refit(members)
+        smaller = [tuple(each for each in members if each != i) for i in members]
+        scale, prior = Scale(total(f.grams), problem.prior, problem.candidates), problem.candidates.prior
+        temperature, whole = tempering(problem, f), scale(members)
+        odds = [(whole - scale(less)) / temperature + prior(members) - prior(less) for less in smaller]
+        small = problem.small_members(f)
+        if min(odds) < 0.0:
+            members = smaller[int(np.argmin(odds))]
+        elif small:
+            members = tuple(i for i in members if i not in small)
+        else:
+            return f
+    return problem.refit(())

@@ -11,18 +11,15 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.verdict import SURE
 from camcomp.diagnosis.search.credible import credibility
-from camcomp.diagnosis.search.established import LEAST_PROBABILITY, established
 from camcomp.diagnosis.search.fitted_sets import EXCHANGES, FittedSets
 from camcomp.diagnosis.search.indistinguishable import likeness, stand_ins
 from camcomp.diagnosis.search.kept_causes import kept_with_unknown
-from camcomp.diagnosis.search.sound import GATE_SHARE, Sound
 from camcomp.diagnosis.search.tempering import misfit, tempering
-from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, size_um, unexplained, worst
+from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
     Members,
-    predictive,
     probabilities,
 )
 from camcomp.diagnosis.statistics.probability import EVEN, TEMPERATURE
@@ -30,11 +27,8 @@ from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.diagnosis.statistics.verdict import Verdict, judge
 from camcomp.ground.datatypes import Floats
 
-BEYOND_DOUBT = (
-    20.0  # log evidence of a member, all tolerances strained as far as they like, above which no run vetoes it
-)
-HARM_LOG = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
 SAME_EVIDENCE = 2.0  # log evidence by which two sets may differ and still be the same answer, whatever their priors
+GATE_SHARE = 0.1  # of what the causes explain: none is modelled better than that
 GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
 LEFT_OPEN = 0.25  # of what causes explain together: no set explains what leaves more, however large its members are
 INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
@@ -54,7 +48,7 @@ class CauseSearch:
 
 def search_causes(problem: Problem) -> CauseSearch:
     """Fit sets, rank them, test the best one for an unmodelled effect, and state probabilities."""
-    sets = FittedSets(problem, Sound(problem))
+    sets = FittedSets(problem)
     sets.search()
     weighed = _weigh_answers(problem, sets)
     best = weighed.fits[weighed.verdict.best]
@@ -81,18 +75,20 @@ class _Weighed:
 
 
 def _weigh_answers(problem: Problem, sets: FittedSets) -> _Weighed:
-    """Sets that predict other runs and whose members are surely more than minor, with rivals by structure, and their verdict."""
+    """Sets without small members, with their probabilities and verdict."""
     for _ in range(EXCHANGES):
-        temperature = tempering(problem, sets.sound.answers(sets.done, sets.fit)[0])
-        fits = tuple(sets.sound.answers(sets.done, sets.fit, temperature))
+        temperature = tempering(problem, sets.answers()[0])
+        fits = tuple(sets.answers(temperature))
         probability = probabilities(fits, problem.candidates, temperature)
-        fits, probability = _prune(problem, fits, probability)
-        fits, probability = established(problem, fits, sets.fit, temperature, probability)
         best = fits[int(np.argmax(probability))]
         if not sets.is_exchangeable(best):
             break
         sets.exchange(best)  # without its weak members a set has rivals of its own
-    fits, probability, same = _with_stand_ins(problem, fits, probability, sets, temperature)
+    by_structure = [sets.fit(members) for members in stand_ins(likeness(problem), best.members, best.theta)]
+    by_structure = [f for f in by_structure if _of_their_signs(problem, f)]
+    fits = tuple(({f.members: f for f in by_structure} | {f.members: f for f in fits}).values())
+    probability = probabilities(fits, problem.candidates, temperature)
+    same = _same(problem, fits, best) + [(best.members, f.members) for f in by_structure]
     return _Weighed(fits, probability, judge(fits, probability, same), temperature)
 
 
@@ -169,7 +165,7 @@ def _credible(
             most = max(replaced, key=lambda i: replaced[i], default=None)
             if most is None or replaced[most] < (EVEN if unknown else INSTEAD):
                 return f, dict(credible.present), instead
-            instead = instead or size_um(problem, f, (most,)) > _least(problem, f)
+            instead = instead or problem.moved_um(f, (most,)) > _least(problem, f)
             kept = tuple(i for i in f.members if i != most)
         f = fit(kept)
         beyond = unexplained(problem, f)
@@ -196,42 +192,8 @@ def _modelled(problem: Problem, f: Fitted) -> float:
     GATE_SHARE of the largest member or of all together, at most LEFT_OPEN of all together: members that cancel are not
     modelled more exactly.
     """
-    together, alone = size_um(problem, f), [size_um(problem, f, (i,)) for i in f.members]
+    together, alone = problem.moved_um(f), [problem.moved_um(f, (i,)) for i in f.members]
     return min(GATE_SHARE * max(together, *alone, 0.0), LEFT_OPEN * together)
-
-
-def _with_stand_ins(
-    problem: Problem, fits: tuple[Fitted, ...], probability: Floats, sets: FittedSets, temperature: float
-) -> tuple[tuple[Fitted, ...], Floats, list[tuple[Members, Members]]]:
-    """The fits with those sets added that do the same as the leader by their structure, and all pairs that are indistinguishable."""
-    best = fits[int(np.argmax(probability))]
-    by_structure = [sets.fit(members) for members in stand_ins(likeness(problem), best.members, best.theta)]
-    by_structure = [f for f in by_structure if _of_their_signs(problem, f) and not sets.sound.cancels(f)]
-    found = {f.members: f for f in by_structure} | {f.members: f for f in fits}
-    if len(found) > len(fits):
-        fits = tuple(found.values())
-        probability = probabilities(fits, problem.candidates, temperature)
-    return fits, probability, _same(problem, fits, best) + [(best.members, f.members) for f in by_structure]
-
-
-def _prune(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> tuple[tuple[Fitted, ...], Floats]:
-    """Scores the leaders on runs not used for fitting; a set that predicts worse than the same set less a member goes."""
-    keep = list(range(len(fits)))
-    if len(problem.bench.runs) < 2:
-        return fits, probability
-    for j in list(np.argsort(-probability)[:4]):
-        f = fits[j]
-        if not f.members or probability[j] < LEAST_PROBABILITY:
-            continue
-        less = [g.log_evidence for g in fits if set(g.members) < set(f.members)]
-        if less and f.log_evidence - max(less) > BEYOND_DOUBT:
-            continue  # what is within tolerance foretells as well once it is strained; the strain is what speaks
-        smaller = [tuple(x for x in f.members if x != i) for i in f.members]
-        scores = predictive(f.grams, problem.prior, problem.candidates, [f.members, *smaller])
-        if scores[0] < scores[1:].max() - HARM_LOG:
-            keep.remove(j)
-    kept = tuple(fits[j] for j in keep)
-    return kept, probability[keep] / probability[keep].sum()
 
 
 def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[tuple[Members, Members]]:

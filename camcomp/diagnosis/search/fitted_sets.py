@@ -7,7 +7,6 @@ members of the best sets until no exchange is better.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import (
@@ -20,14 +19,12 @@ from camcomp.diagnosis.statistics.cause_sets import (
     pairs,
     parted,
     total,
+    with_minor,
 )
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.stepwise import stepwise
 from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS
 from camcomp.ground import progress
-
-if TYPE_CHECKING:
-    from camcomp.diagnosis.search.sound import Sound
 
 # sets that are tried of each size, and of those that begin with an effect at all of its targets
 SINGLES, PAIRS, TRIPLES, KINDS = 6, 6, 3, 3
@@ -43,13 +40,13 @@ Ranked = list[tuple[float, Members, Fitted | None]]  # log posterior of sets, ea
 class FittedSets:
     """The sets of causes of a problem that were fitted so far."""
 
-    def __init__(self, problem: Problem, sound: Sound) -> None:
+    def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.every = [i for i in range(len(problem.columns.candidates)) if is_visible(problem, i)]
         self.null = problem.refit(())
         self.at_null = Scale(total(self.null.grams), problem.prior, problem.candidates)
         self.done: dict[Members, Fitted] = {(): self.null}
-        self.sound, self._exchanged = sound, set[Members]()
+        self._exchanged = set[Members]()
 
     def fit(self, members: Members, near: Fitted | None = None) -> Fitted:
         """A set fitted through the twin, from the linear answer or from that of a fit near it; once each."""
@@ -129,13 +126,32 @@ class FittedSets:
     def exchange_members(self) -> None:
         """Exchanges of members of the best answers: what was taken first may stand for what was found last."""
         for _ in range(EXCHANGES):
-            answers = self.sound.answers(self.done, self.fit)
+            answers = self.answers()
             least = self.value(answers[0]) - EQUAL_LOG_ODDS
             good = [self.done[f.all_members] for f in answers if self.value(f) > least]
             tied = [f for f in good if f.members not in self._exchanged]
             if not tied or len(good[0].members) > EXCHANGEABLE:
                 break
             self.exchange(max(tied, key=self.value))
+
+    def answers(self, temperature: float = 1.0) -> list[Fitted]:
+        """Sets without small members, the most probable first.
+
+        A set with small members that is as likely as the best one gives its evidence to the set of its other members: a
+        larger set would take their place otherwise.
+        """
+
+        def value(f: Fitted) -> float:
+            return self.problem.candidates.value(f, temperature)
+
+        found = {f.members: f for f in self.done.values() if not self.problem.small_members(f)}
+        least = max(map(value, found.values())) - EQUAL_LOG_ODDS
+        for f in [f for f in self.done.values() if value(f) > least and f.members not in found]:
+            less = f
+            while small := self.problem.small_members(less):
+                less = self.fit(tuple(i for i in less.members if i not in small))
+            found[less.members] = max(found.get(less.members, less), with_minor(less, f), key=value)
+        return sorted(found.values(), key=value, reverse=True)
 
     def is_exchangeable(self, f: Fitted) -> bool:
         """Whether exchanges of members of a fit are still to be tried."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from camcomp.diagnosis.fit.gap import rest_by_actuator, tip_by_actuator
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.search.unexplained import Unexplained, size_um, worst
+from camcomp.diagnosis.search.unexplained import Unexplained, worst
 from camcomp.diagnosis.search.unknown import foretelling, signal_rms
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.diagnosis.statistics.probability import EVEN
@@ -59,6 +59,6 @@ def _beside(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained], memb
         there = where is not None and target == where
         if where is not None and target is None:
             there = tip_by_actuator(problem, f, i).get(where, 0.0) > EVEN
-        size = size_um(problem, f, (i,))
+        size = problem.moved_um(f, (i,))
         out[i] = _Beside(size / max(left, 1e-9), size / max(whole, 1e-9), there, target is None and not there)
     return out

@@ -20,12 +20,10 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import BLOCK
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Floats
 
-UNDETERMINED = 0.5  # of a cause's size: runs that know it to no better say nothing of it
 FEW_RUNS = 3  # from which on causes are fitted to the other runs
 KINDS = ("tip", "encoder", "drive", "dyno")
-NOISIEST = 2.0  # of the floor: what the tip scatters by in one run and is its instrument's
 SURE_Z = 5.0  # standard deviations of chance
 TINY = 1e-12  # mm2, below which no noise is
 
@@ -61,18 +59,13 @@ def unexplained(problem: Problem, f: Fitted) -> dict[str, Unexplained]:
 
 
 def _left(problem: Problem, f: Fitted, k: int) -> Floats:
-    """Channels (n, c) of run k that the causes, fitted to the other runs, and the usual small errors leave.
-
-    Where the other runs say nothing of a cause (they are all in the air, and it bends the tool), what they do not foretell of it
-    is no sign of anything else.
-    """
+    """Channels (n, c) of run k that the causes, fitted to the other runs, and the usual small errors leave."""
     bench = problem.bench
     theta = f.theta
     if len(bench.runs) >= FEW_RUNS:
-        without, doubt = problem.told_without(f, k)
         widths = [len(problem.candidates.columns[i]) for i in f.members]
         passing = np.repeat([problem.passing(i) for i in f.members], widths).astype(bool)
-        theta = np.where(passing | untold(theta, doubt, widths), theta, without)
+        theta = np.where(passing, theta, problem.theta_without(f, k))
     left = bench.difference(k, bench.read(k, problem.causes(f.members, theta, f.extra)))
     index = problem.member_columns(f.members)
     usual = estimate(total(f.grams), problem.prior, index, 1.0)[0]
@@ -82,17 +75,6 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
         left = left - problem.farther(f)[k] @ usual[pushed]
         usual[pushed] = 0.0
     return np.asarray(left - (problem.columns.blocks[k] @ usual).reshape(left.shape[1], -1).T)
-
-
-def untold(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
-    """Mask (d,) of coordinates theta that runs do not determine, given their standard deviations doubt (d,); a cause is
-    masked as a whole.
-
-    widths: how many are a cause's. One that is small beside its cause's others is no reason to ask the run itself.
-    """
-    faint, ends = doubt > UNDETERMINED * np.abs(theta), np.cumsum(widths)
-    each = [bool(faint[end - width : end].all()) for end, width in zip(ends, widths, strict=True)]
-    return np.repeat(each, widths).astype(bool)
 
 
 def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
@@ -122,12 +104,9 @@ def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
 def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:
     """Excess residual of one kind of channel, from residuals (n, 3) of every run, mm at the tip."""
     slow = problem.floor.slow_mm if kind == "tip" else 0.0
-    # no encoder is worse than the tip's instrument, nor is that one in one run so much worse than in all
-    noisiest = {"encoder": problem.floor.axis_mm, "tip": NOISIEST * problem.floor.axis_mm}
     excess: list[Floats] = []
     chance: list[Floats] = []
     weight: list[Floats] = []
-    swing: list[tuple[Floats, Floats]] = []
     place: list[tuple[int, float, float]] = []
     for k, values in enumerate(at_tip):
         t = problem.times[k]
@@ -135,8 +114,8 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
         values = np.where(inflate < 3.0, values, np.nan)
         noise = np.array([row_scatter(x, t) for x in values.T])
         noise = np.where(np.isfinite(noise), noise, 0.0)
-        if kind in noisiest:  # what shakes more from row to row is motion
-            noise = np.minimum(noise, noisiest[kind])
+        if kind == "encoder":  # what shakes more than the instrument of the tip is motion
+            noise = np.minimum(noise, problem.floor.axis_mm)
         for a in range(0, len(values), BLOCK):
             rows = values[a : a + BLOCK]
             count = np.isfinite(rows).sum(axis=0)
@@ -144,8 +123,6 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
             if not enough.any():
                 continue
             middle = np.nansum(rows, axis=0) / np.maximum(count, 1)
-            if kind in noisiest:
-                swing.append(_swing(rows - middle, inflate[a : a + BLOCK], noisiest[kind]))
             usual = noise**2 / np.maximum(count, 1) + slow**2
             # rows of which less is known than their noise says (a force that turns between rows) err together
             more = np.where(np.isfinite(rows), inflate[a : a + BLOCK] ** 2 - 1.0, 0.0).sum(axis=0)
@@ -161,13 +138,9 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
     mean = float((np.sum(w * e, axis=0) / whole).sum())
     doubt = float(np.sqrt(2.0 * np.sum(np.sum((w * v) ** 2, axis=0) / whole**2))) + TINY
     local, at = _stretch((w * e).sum(axis=1), place)
-    z, energy = mean / doubt, np.sum(w * e, axis=0)
-    fast, its_z = _fast(swing)
-    if its_z > SURE_Z:
-        mean, z, energy = max(mean, 0.0) + float(fast.sum()), max(z, its_z), np.maximum(energy, 0.0) + len(e) * fast
     return Unexplained(
-        kind=kind, excess_um=1e3 * float(np.sqrt(max(mean, 0.0))), z=z,
-        local_um=1e3 * float(np.sqrt(max(local, 0.0))), where=at, energy=energy,
+        kind=kind, excess_um=1e3 * float(np.sqrt(max(mean, 0.0))), z=mean / doubt,
+        local_um=1e3 * float(np.sqrt(max(local, 0.0))), where=at, energy=np.sum(w * e, axis=0),
     )  # fmt: skip
 
 
@@ -178,28 +151,6 @@ def _inflation(problem: Problem, k: int, kind: str, values: Floats) -> Floats:
     if kind == "encoder":  # each moves the tip along its own way: the worst of them counts
         return np.repeat(problem.late_drives[k].max(axis=1)[:, None], 3, axis=1)
     return np.ones_like(values)
-
-
-def _swing(rows: Floats, inflate: Floats, noisiest: float) -> tuple[Floats, Floats]:
-    """By how much (3,) mm2 the rows of a block swing about their middle beyond the noisiest instrument, and its variance by chance."""
-    there = np.isfinite(rows)
-    free = np.maximum(there.sum(axis=0) - 1, 1)
-    allowed = noisiest**2 * np.where(there, inflate**2, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
-    beyond = np.nansum(rows**2, axis=0) / free - allowed
-    enough = there.sum(axis=0) >= BLOCK // 2
-    return np.where(enough, beyond, 0.0), np.where(enough, 2.0 * allowed**2 / free, 0.0)
-
-
-def _fast(swing: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, float]:
-    """What swings faster than the blocks: its mean square (3,) mm2, and standard deviations of its chance.
-
-    Averaging hides a loop that rings; the instrument of the tip does not ring.
-    """
-    if not swing:
-        return np.zeros(3), 0.0
-    mean = np.mean([each for each, _ in swing], axis=0)
-    doubt = float(np.sqrt(np.sum([each for _, each in swing]))) / len(swing) + TINY
-    return np.maximum(mean, 0.0), float(mean.sum()) / doubt
 
 
 LOCAL_BLOCKS = 5  # of a stretch in which something acts for a while
@@ -219,14 +170,6 @@ def _stretch(each: Floats, place: Sequence[tuple[int, float, float]]) -> tuple[f
         if mean[i] > best:
             best, at = float(mean[i]), (int(k), place[mine[i]][1], place[mine[i + n - 1]][2])
     return best, at
-
-
-def size_um(problem: Problem, f: Fitted, members: Sequence[int] | None = None) -> float:
-    """How far (rms over the rows, um) the members, or some of them, move the tip by themselves."""
-    index = problem.member_columns(f.members)
-    mine = set(problem.member_columns(tuple(f.members if members is None else members)))
-    theta = np.array([t if c in mine else 0.0 for c, t in zip(index, f.theta, strict=True)])
-    return problem.size_um(index, theta)
 
 
 def worst(left: Mapping[str, Unexplained]) -> Unexplained:

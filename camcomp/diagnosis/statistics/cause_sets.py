@@ -161,20 +161,6 @@ class Scale:
         return np.asarray(none + np.logaddexp.reduce(each) - log_sum([odds for odds, _ in ways]))
 
 
-def predictive(grams: Sequence[Gram], prior: Prior, candidates: CausePrior, sets: Sequence[Members]) -> Floats:
-    """Sum over runs of the log density of a run given the others (s,), for every set; one run only: its evidence."""
-    everything = total(grams)
-    whole = Scale(everything, prior, candidates)
-    full = np.array([whole(each) for each in sets])
-    if len(grams) == 1:
-        return full
-    out = np.zeros(len(sets))
-    for g in grams:
-        rest = Scale(everything - g, prior, candidates)
-        out += full - np.array([rest(each) for each in sets])
-    return out
-
-
 def extensions(
     scale: Scale, members: Members, candidates: Sequence[int], most: int | None = None
 ) -> list[tuple[float, Members]]:

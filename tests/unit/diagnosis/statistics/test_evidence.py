@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import lsq_linear
 from scipy.stats import norm
 
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale, predictive
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale
 from camcomp.diagnosis.statistics.evidence import (
     PRIOR_WIDTHS,
     Prior,
@@ -91,14 +91,6 @@ def test_the_right_cause_wins_and_its_estimate_covers_the_truth():
         mean, covariance = estimate(g, p, [1])
         hits += abs(mean[1] - 0.4) < 1.96 * np.sqrt(covariance[1, 1])
     assert hits >= 16
-
-
-def test_runs_left_out_are_predicted_better_with_the_cause_than_without():
-    p = prior(4)
-    candidates = CausePrior(((0,), (1,), (2,), (3,)), np.log(np.full(4, 0.25)), lambda i, j: False)
-    runs = [data([0, 0.4, 0, 0], seed=s) for s in range(4)]
-    with_it, without, wrong = predictive(runs, p, candidates, [(1,), (), (3,)])
-    assert with_it > without + 5 and with_it > wrong + 5
 
 
 def strained(reach):
