@@ -17,7 +17,7 @@ from camcomp.model.job import Job
 if TYPE_CHECKING:
     from camcomp.compensation.long.totals import Totals
 
-LONG = 1 << 16  # bytes from which it pays to interpolate: some 2 000 lines
+LONG = 1 << 14  # bytes from which it pays to interpolate: some 500 lines
 
 
 @dataclass(frozen=True)

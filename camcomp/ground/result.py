@@ -20,7 +20,11 @@ class Result(BaseModel):
     """Base of every part of a result: no other keys, finite numbers, keys in the order of the fields."""
 
     model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, json_schema_serialization_defaults_required=True
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        json_schema_serialization_defaults_required=True,
+        defer_build=True,
     )
 
     INDENT: ClassVar[int] = 2

@@ -27,7 +27,7 @@ from camcomp.ground.bounds import SMALLEST_NUMBER
 class Spec(BaseModel):
     """Base of every YAML mapping. `source` says where its values come from."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True)
 
     source: str | None = Field(
         None, description="where the values of this mapping come from", examples=["data sheet of the maker"]
