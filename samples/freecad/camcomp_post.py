@@ -47,7 +47,8 @@ def export(objectslist, filename, argstring):
         if not os.path.exists(posted):
             raise PostError(f"camcomp: the post '{options.post}' wrote no program")
         with open(stated, "w", encoding="utf-8") as file:
-            json.dump(sections_of(job, folder), file, indent=1)  # JSON is YAML
+            unit = {"control": {"program_unit": "inch"}} if "--inches" in others else {}  # some posts write no G20
+            json.dump({**sections_of(job, folder), **unit}, file, indent=1)  # JSON is YAML
         text, figures = compensated(options, posted, stated, filename)
     show(figures)
     return text

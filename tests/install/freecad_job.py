@@ -65,19 +65,20 @@ def main():
             words = "--no-show-editor" + " --inches" * (unit == "inch")
             PostProcessor.load(post).export(objects, "{}/{}-{}.nc".format(task["folder"], post, unit), words)
     words = "--config {} --camcomp {} --no-header".format(task["config"], task["camcomp"])
-    for stock, post in task["through"]:
+    for stock, post, more in task["through"]:
         change_stock(job, stock)
         name = "{}/camcomp-{}-{}.nc".format(task["folder"], stock, post)
         try:
-            PostProcessor.load("camcomp").export(objects, name, f"{words} --post {post}")
-            said[stock] = "written"
+            PostProcessor.load("camcomp").export(objects, name, f"{words} --post {post} {more}")
+            said[post] = "written"
         except Exception as error:  # noqa: BLE001
-            said[stock] = str(error)
+            said[post] = str(error)
     with open(os.environ["JOB"] + ".out", "w", encoding="utf-8") as file:
         json.dump(said, file)
 
 
-try:
-    main()
-except BaseException:  # noqa: BLE001
-    traceback.print_exc()
+if "JOB" in os.environ:
+    try:
+        main()
+    except BaseException:  # noqa: BLE001
+        traceback.print_exc()

@@ -1,26 +1,30 @@
 """Programs of FreeCAD's posts, and the add-on of samples/freecad in FreeCAD itself."""
 
 import json
-import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from camcomp.api.machine import load_machine
 from camcomp.gcode.interpret import read_program
+from camcomp.gcode.setup import Setup
 from camcomp.ground.datatypes import RAPID
-from camcomp.ground.files import shipped
+from camcomp.ground.errors import ProgramError
+from camcomp.model.from_program import job_of_program
+from tests.install import pictures
 
 POSTS = ("linuxcnc", "grbl", "mach3_mach4", "centroid", "dynapath", "smoothie", "uccnc")
 NO_G20 = "uccnc"  # leaves the unit to the profile of the control
-THROUGH = (("box", "linuxcnc"), ("cylinder", "mach3_mach4"), ("wedge", "smoothie"))
-HALF_DECIMAL = {"mm": (0.0006, 0.06), "inch": (0.0014, 1.3)}  # mm and mm/min: 3 and 1 decimals, 4 and 1 in inch
-FORCE = (
-    "Ktc_N_per_mm2: 631, Krc_N_per_mm2: 99, Kac_N_per_mm2: 273, Kte_N_per_mm: 13, Kre_N_per_mm: 10, Kae_N_per_mm: 2.8"
+THROUGH = (
+    ("box", "linuxcnc", ""),
+    ("cylinder", "mach3_mach4", ""),
+    ("wedge", "smoothie", ""),
+    ("box", NO_G20, "--inches"),
 )
+HALF_DECIMAL = {"mm": (0.0006, 0.06), "inch": (0.0014, 1.3)}  # mm and mm/min: 3 and 1 decimals, 4 and 1 in inch
 HEAD = "(Exported by FreeCAD)\n(Post Processor: {post}_post)\n(Begin preamble)\nG17 G90\n{unit}\n(Begin operation: G54)\nG54\n"
 WRITTEN = {  # by hand, in the form of FreeCAD 0.20
     "linuxcnc in mm": HEAD.format(post="linuxcnc", unit="G21")
@@ -32,9 +36,9 @@ WRITTEN = {  # by hand, in the form of FreeCAD 0.20
 }
 
 
-def feeds(data, name):
-    """End points (k, 3) mm of feed moves, and kinds and feeds (k, 2)."""
-    path = read_program(data, name=name).path
+def feeds(data, name, unit_mm=1.0):
+    """End points (k, 3) mm of feed moves, and kinds and feeds (k, 2). unit_mm: of a program without a unit code."""
+    path = read_program(data, name=name, setup=Setup(unit_mm=unit_mm)).path
     feeding = path.kind != RAPID
     return path.end[feeding], np.column_stack((path.kind[feeding], path.feed[feeding]))
 
@@ -55,41 +59,39 @@ def test_one_job_of_freecad_reads_alike_from_seven_posts_and_goes_through_the_ad
     assert len(wanted) > 10
     for post in POSTS:
         for unit, (step, feed_step) in HALF_DECIMAL.items():
-            if (post, unit) == (NO_G20, "inch"):
-                continue
             name = f"{post}-{unit}.nc"
-            ends, mine = feeds((tmp_path / name).read_bytes(), name)
+            step = 0.0128 if name == f"{NO_G20}-inch.nc" else step  # it writes three decimals there, too
+            ends, mine = feeds((tmp_path / name).read_bytes(), name, 25.4 if unit == "inch" else 1.0)
             assert ends == pytest.approx(wanted, abs=2 * step), name
             assert mine[:, 0].tolist() == how[:, 0].tolist(), name
             assert mine[:, 1] == pytest.approx(how[:, 1], abs=2 * feed_step), name
-    for stock, _ in THROUGH:
-        assert said[stock] == "written", said[stock]
-    moved, _ = feeds((tmp_path / "camcomp-box-linuxcnc.nc").read_bytes(), "box.nc")
-    beyond = np.abs([moved.max(axis=0) - wanted.max(axis=0), moved.min(axis=0) - wanted.min(axis=0)])
-    assert 2e-4 < beyond.max() < 0.02  # mm, of 34 N at 20 000 N/mm: the force of the stock
-    for stock, post in THROUGH:
-        assert "camcomp" in (tmp_path / f"camcomp-{stock}-{post}.nc").read_text().split("\n")[0]
+    with pytest.raises(ProgramError) as caught:  # its unit stands in a comment only
+        job_of_program(load_machine(tmp_path / "machine.yaml"), (tmp_path / f"{NO_G20}-inch.nc").read_bytes(), "p.nc")
+    assert caught.value.rule == "CC147"
+    for _, post, _ in THROUGH:
+        assert said[post] == "written", said[post]
+    for post, unit, unit_mm in (("linuxcnc", "mm", 1.0), (NO_G20, "inch", 25.4)):
+        before, _ = feeds((tmp_path / f"{post}-{unit}.nc").read_bytes(), "before.nc", unit_mm)
+        moved, _ = feeds((tmp_path / f"camcomp-box-{post}.nc").read_bytes(), "box.nc", unit_mm)
+        beyond = np.abs([moved.max(axis=0) - before.max(axis=0), moved.min(axis=0) - before.min(axis=0)])
+        assert 2e-4 < beyond.max() < 0.02, (post, beyond)  # mm, of 34 N at 20 000 N/mm: the force of the stock
+    for stock, post, _ in THROUGH:
+        assert "camcomp" in (tmp_path / f"camcomp-{stock}-{post}.nc").read_text()[:200]
+
+
+@pytest.mark.ecosystem
+@pytest.mark.skipif(not (shutil.which("freecad") and shutil.which("xvfb-run")), reason="needs FreeCAD and Xvfb")
+def test_the_window_lists_the_add_on_and_shows_the_figures(tmp_path):
+    said = pictures.make(tmp_path)
+    assert [name for name in pictures.NAMES if not (tmp_path / f"freecad-{name}.png").exists()] == [], said
+    assert "camcomp" in (tmp_path / "part.nc").read_text().split("\n")[0]
 
 
 def in_freecad(folder):
     """Posts of FreeCAD in a folder, with the add-on where FreeCAD looks for add-ons."""
-    mod = folder / "home" / ".local" / "share" / "FreeCAD" / "Mod"
-    shutil.copytree(shipped("samples/freecad"), mod / "camcomp")
-    program = folder / "camcomp"
-    program.write_text(
-        f'#!/bin/sh\nexport PYTHONPATH={os.environ.get("PYTHONPATH", Path.cwd())}\nexec {sys.executable} -m camcomp "$@"\n'
-    )
-    program.chmod(0o755)
-    machine = folder / "machine.yaml"
-    text = Path(shipped("config/cartesian.yaml")).read_text()
-    machine.write_text(text.replace("model: constant, Fr_N: 215, Ft_N: -10, Fz_N: -25", f"model: mechanistic, {FORCE}"))
-    task = {"folder": str(folder), "posts": POSTS, "through": THROUGH, "config": str(machine), "camcomp": str(program)}
-    (folder / "job.json").write_text(json.dumps(task))
-    env = os.environ | {
-        "JOB": str(folder / "job.json"),
-        "HOME": str(folder / "home"),
-    }
-    env.pop("PYTHONPATH", None)
+    task, env = pictures.prepared(folder)
+    env["JOB"] = str(folder / "job.json")
+    (folder / "job.json").write_text(json.dumps({**task, "posts": POSTS, "through": THROUGH}))
     job = Path(__file__).with_name("freecad_job.py")
     command = ["freecadcmd", str(job)]
     done = subprocess.run(
