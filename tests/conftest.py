@@ -59,6 +59,35 @@ def traced(item):
         running.start()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def sample_experiments_are_diagnosed_once():
+    """What a process has found for the files of a sample experiment is found for the same files again."""
+    from camcomp.api import diagnosis as api
+    from camcomp.diagnosis import diagnose as module
+
+    whole, judge, found = api._diagnosed, module.diagnose, {}
+
+    def diagnosed(experiment, *how):
+        with pytest.MonkeyPatch.context() as patch:
+            if "samples/diagnosis" in Path(experiment).as_posix():
+                patch.setattr(module, "diagnose", once)
+            return whole(experiment, *how)
+
+    def once(job, twin, runs, **how):
+        key = (
+            job.config.model_dump_json(),
+            repr(how),
+            *(v.tobytes() for run in runs for v in vars(run.measured).values()),
+        )
+        if key not in found:
+            found[key] = judge(job, twin, runs, **how)
+        return found[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(api, "_diagnosed", diagnosed)
+        yield
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item):
     """Takes a shared turn for every test, one of its own for those marked `alone`, fixtures included."""

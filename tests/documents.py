@@ -90,12 +90,10 @@ class Reader:
         self.folder = folder
         self.installs = False  # packages, which other processes see
         tools.mkdir()
-        script = tools / "camcomp"
-        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m camcomp "$@"\n')
-        pip = tools / "pip"
-        pip.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m pip "$@"\n')
-        for each in (script, pip):
-            each.chmod(0o755)
+        for name, call in (("camcomp", "-m camcomp"), ("pip", "-m pip"), ("python", "")):
+            script = tools / name
+            script.write_text(f'#!/bin/sh\nexec "{sys.executable}" {call} "$@"\n')
+            script.chmod(0o755)
         self.environment = {
             **os.environ,
             "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}",

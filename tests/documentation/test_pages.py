@@ -16,6 +16,7 @@ DOCS = ROOT / "docs"
 FOLLOWED = sorted(
     path for path in DOCS.rglob("*.md") if any(isinstance(each, Command) for each in steps(path.read_text("utf-8")))
 )
+FOLLOWED += [ROOT / "samples/tutorial.md", ROOT / "samples/diagnosis/README.md"]
 
 
 @pytest.fixture
@@ -24,18 +25,12 @@ def reader(tmp_path):
     return Reader(tmp_path / "folder", tmp_path / "tools")
 
 
-@pytest.mark.parametrize("path", FOLLOWED, ids=lambda path: path.relative_to(DOCS).as_posix())
+@pytest.mark.parametrize("path", FOLLOWED, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_commands_of_a_page_print_what_stands_there(path, reader):
     """They run in a folder that holds config and samples."""
     for name in ("config", "samples"):
         shutil.copytree(ROOT / name, reader.folder / name)
     reader.follow(path.read_text(encoding="utf-8"))
-
-
-def test_the_tutorial_is_followed(reader):
-    for name in ("config", "samples"):
-        shutil.copytree(ROOT / name, reader.folder / name)
-    reader.follow((ROOT / "samples/tutorial.md").read_text(encoding="utf-8"))
 
 
 def test_the_readme_is_followed(reader):
