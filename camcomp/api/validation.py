@@ -81,7 +81,8 @@ def _check_experiment(file: str) -> tuple[str, list[Doubt]]:
         if run.program is not None:
             _collect(errors, partial(open_program, run.program, config))
     raise_all(errors)
-    return f"experiment, {len(experiment.runs)} runs", [] if config is None else doubts(config)
+    runs = f"{len(experiment.runs)} run{'' if len(experiment.runs) == 1 else 's'}"
+    return f"experiment, {runs}", [] if config is None else doubts(config)
 
 
 def _collect(errors: list[CamcompError], read: Callable[[], T]) -> T | None:

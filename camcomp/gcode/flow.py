@@ -22,10 +22,6 @@ _MOST_BLOCKS = 150_000  # executed by a program that has loops
 _MOST_IDLE = 100_000  # consecutive blocks without a motion
 MIN_ROWS = 256  # of a program that is searched for runs of plain lines
 _INCREMENTAL_LETTERS = "XYZIJKRQ"
-_AS_LENGTHS = (
-    "numbers without a point are read as mm or inch, X10 as 10 mm; a controller that counts increments reads 0.01 mm: "
-    "if yours does, state `control: {input_increment_mm: 0.001}`"
-)
 
 
 class Flow:
@@ -195,7 +191,12 @@ class Flow:
                 continue
             if increment is None:
                 self.reader.block.row = row
-                self.reader.warn(_AS_LENGTHS, once=True)
+                unit, small = ("inch", 0.001) if inch else ("mm", 0.01)
+                text = (
+                    f"numbers without a point are read as {unit}, X10 as 10 {unit}; a controller that counts increments "
+                    f"reads {small} {unit}: if yours does, state `control: {{input_increment_mm: 0.001}}`"
+                )
+                self.reader.warn(text, once=True)
                 return words
             words = [*words]
             words[index] = word._replace(value=word.value * (increment / 10.0 if inch else increment))

@@ -150,7 +150,7 @@ def test_where_the_control_goes_off_is_told_with_its_lines(orthoglide):
     )
     told = [each for each in done.warnings if "the controller drives" in each]
     assert told and all(each.startswith("in G64 P0.01 the controller drives up to ") for each in told)
-    assert ": source line 6;" in told[-1]  # whose corners are rounded
+    assert "at source line 6;" in told[-1]  # whose corners are rounded
     exact = compensated(orthoglide, rectangle(3000), "G61")
     assert not any("the controller drives" in each for each in exact.warnings)
 

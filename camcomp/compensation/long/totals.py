@@ -31,9 +31,10 @@ from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.uncorrected import UncorrectedFeeds, below_step_warning
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
+from camcomp.ground.source_lines import MOST_LINES, named_lines
 from camcomp.model.control import limits_of
 from camcomp.model.cutting.assumed import RapidsAtDepth
-from camcomp.model.cutting.spindle import MOST_LINES, spindle_warning
+from camcomp.model.cutting.spindle import spindle_warning
 from camcomp.model.job import Job
 from camcomp.model.statics.target import correct, settle
 from camcomp.model.trajectory.moves import line_moves, moves_of
@@ -350,13 +351,8 @@ class Totals:
             if self._beyond[a]:
                 low, high = self.job.machine.limits[a]
                 unit, k = ("deg", 180.0 / np.pi) if self.job.machine.revolute[a] else ("mm", 1.0)
-                lines = ", ".join(map(str, self._beyond[a]))
-                out.append(
-                    (
-                        "CC602",
-                        f"actuator {name} leaves its travel {k * low:g} to {k * high:g} {unit} at source lines {lines}",
-                    )
-                )
+                span, lines = f"{k * low:g} to {k * high:g} {unit}", named_lines(self._beyond[a])
+                out.append(("CC602", f"actuator {name} leaves its travel {span} at {lines}"))
         if self.interpolated and not self.interpolated.worst_um <= BOUND_UM:
             text = (
                 f"{self.interpolated.worst_um:.3f} um between interpolated and exact points, more than {BOUND_UM:g} um"

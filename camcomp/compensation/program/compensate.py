@@ -57,6 +57,7 @@ from camcomp.gcode.uncorrected import below_step_warning
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.progress import part as part_of_work
+from camcomp.ground.source_lines import named_lines
 from camcomp.model.cutting.assumed import doubtful_force
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
@@ -133,10 +134,11 @@ class Compensated:
             value = self.state.rho[:, a]
             over = np.flatnonzero((value < low) | (value > high))
             if len(over):
-                lines = ", ".join(str(n) for n in np.unique(self.lines[over])[:10])
                 unit, k = ("deg", 180.0 / np.pi) if job.machine.revolute[a] else ("mm", 1.0)
                 span = f"{k * low:g} to {k * high:g} {unit}"
-                out.append(("CC602", f"actuator {name} leaves its travel {span} at source lines {lines}"))
+                out.append(
+                    ("CC602", f"actuator {name} leaves its travel {span} at {named_lines(np.unique(self.lines[over]))}")
+                )
         return out
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import PhysicsError
+from camcomp.ground.source_lines import named_lines
 from camcomp.model.job import Job
 from camcomp.model.statics.arm import NEAR_SINGULAR, Arm, arm_of, dexterity, follow
 
@@ -34,9 +35,8 @@ def check_posture(program: Program, job: Job, line: Ints, tip: Floats, rho: Floa
     near = np.unique(line[room < NEAR_SINGULAR])
     if not len(near):
         return []
-    lines = ", ".join(str(n) for n in near[:10]) + (" ..." if len(near) > 10 else "")
     worst = int(np.argmin(room))
-    text = f"near a singular configuration at source lines {lines}: nearest at line {line[worst]}, "
+    text = f"near a singular configuration at {named_lines(near)}: nearest at line {line[worst]}, "
     return [text + f"dexterity {room[worst]:.4f}; drives move fast there, and their errors grow"]
 
 

@@ -20,6 +20,7 @@ from camcomp.gcode.output import Rewritten
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
+from camcomp.ground.source_lines import MOST_LINES, named_lines
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves, mode_columns, moves_of
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from camcomp.compensation.program.judged_points import JudgedPoints, Seen
 
 LOST_TIME = 1.02  # factor of the cycle time from which a faster way is looked for
-MOST_LINES = 10  # that a warning names
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,9 @@ class FarOff:
         """Warning of the contour error in this path mode; empty if it is small."""
         if not self.um:
             return []
-        lines = ", ".join(str(line) for line in sorted(line for _, line in self.um[:MOST_LINES]))
-        more = " ..." if len(self.um) > MOST_LINES else ""
-        plural = "s" if len(self.um) > 1 else ""
+        lines = named_lines(sorted(line for _, line in self.um))
         off = f"in {mode} the controller drives up to {self.um[0][0]:.1f} um off the written path{what}"
-        return [f"{off}: source line{plural} {lines}{more}; a smaller tolerance of the path mode reduces it"]
+        return [f"{off}, at {lines}; a smaller tolerance of the path mode reduces it"]
 
 
 def warnings_of(modes: tuple[PathMode, ...], beside: FarOff, elsewhere: FarOff) -> list[str]:

@@ -60,6 +60,7 @@ class Verified:
     missed: Floats | None = None  # (k,) mm beside what a policy leaves on purpose; None: it leaves nothing
     totals: BandTotals | None = None  # None: every number of the config is exact
     policy: str = "full"
+    stamped: bool = True  # the program carries the stamp of a compensation
 
     def figures(self, tolerance_um: float) -> Verification:
         """The figures of a verification."""
@@ -131,7 +132,7 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     )  # fmt: skip
     return Verified(
         residual=residual, lines=lines, joining=joins, control=control, warnings=[*warnings, *foreign], missed=missed,
-        totals=totals, policy=job.config.compensation.policy,
+        totals=totals, policy=job.config.compensation.policy, stamped=is_stamped(corrected.data),
     )  # fmt: skip
 
 

@@ -28,15 +28,15 @@ def verdict_text(result: DiagnosisResult) -> str:
         f"On runs that the fit has not seen the gap goes from {micrometres(shrink.before_rms_um)} to "
         f"{micrometres(shrink.after_rms_um)} (rms); the noise floor is {floor}."
         if shrink
-        else f"There is no run that the fit has not seen; the noise floor is {floor}."
+        else f"Every run is in the fit, so the prediction of an unseen one is not checked; the noise floor is {floor}."
     )
     if not result.known and result.verdict == UNKNOWN:
         told = f"The gap is {micrometres(gap.rms_um)} (rms), the noise floor {floor}."
     known = [cause_name(each) for each in result.known]
     if result.verdict == "none":
         return (
-            f"Measurement and model differ by {micrometres(gap.rms_um)} (rms), which is the noise floor of {floor}: there "
-            "is nothing to explain."
+            f"Measurement and model differ by {micrometres(gap.rms_um)} (rms), which is no more than noise (floor {floor}): "
+            "there is nothing to explain."
         )
     if result.verdict == "identified":
         return f"{listed(known)} {'explain' if len(known) > 1 else 'explains'} the gap. {told}"

@@ -15,6 +15,7 @@ import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.source_lines import named_lines
 from camcomp.model.config.cutting_tool import Cutter
 from camcomp.model.config.spec import Config
 from camcomp.model.cutting.track import PLUNGE_SINE
@@ -22,7 +23,6 @@ from camcomp.model.cutting.track import PLUNGE_SINE
 Engagement = Literal["stock", "stated", "none"]
 TWO_WAYS = "`workpiece: {stock: ...}` or `--stock program`"
 LEVEL_MM = 1e-3  # of height: moves within it stay at one depth
-MOST_LINES = 10  # named in a warning
 MOST_SAMPLES = 20_000  # of a path in the step-over test
 SAMPLE_DIAMETERS = 0.5  # distance of samples along the path, in tool diameters
 STEP_OVER_DIAMETERS = (0.05, 0.9)  # distance of a neighbouring pass, in tool diameters: retraced paths are no step-over
@@ -56,9 +56,9 @@ def assumed_force(config: Config) -> AssumedForce:
     top = config.workpiece.stock_top_mm
     if top is not None:
         return AssumedForce(model, "stated", f"{cut} on every feed move below Z {top:g} mm")
-    where = "on every feed move, no stock: air and finishing passes get it too"
+    where = "on every feed move, also in air and in finishing passes"
     stated = model != "constant" and process.width_mm is not None
-    return AssumedForce(model, "stated" if stated else "none", f"{cut} {where}; {TWO_WAYS}")
+    return AssumedForce(model, "stated" if stated else "none", f"{cut} {where}: no stock is stated ({TWO_WAYS})")
 
 
 def _cut(config: Config) -> str:
@@ -128,9 +128,7 @@ class RapidsAtDepth:
         """One warning with the source lines, or none."""
         if not self.lines:
             return []
-        first = sorted(self.lines)[:MOST_LINES]
-        named = ", ".join(map(str, first)) + (" ..." if len(self.lines) > MOST_LINES else "")
-        where = f"G0 at cutting depth between two cuts at source lines {named}"
+        where = f"G0 at cutting depth between two cuts at {named_lines(sorted(self.lines))}"
         return [
             f"{where}: the model has no force there, and the machine may cut at rapid speed; retract, or state the stock"
         ]

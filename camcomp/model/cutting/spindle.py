@@ -3,9 +3,8 @@
 import numpy as np
 
 from camcomp.ground.datatypes import Ints
+from camcomp.ground.source_lines import named_lines
 from camcomp.model.cutting.track import NO_FORCE, Track
-
-MOST_LINES = 10  # that a warning names
 
 
 def cut_without_spindle(track: Track) -> Ints:
@@ -17,7 +16,4 @@ def cut_without_spindle(track: Track) -> Ints:
 
 def spindle_warning(lines: Ints) -> list[str]:
     """Warning for source lines, ascending, that cut with a stopped spindle; empty without any."""
-    if not len(lines):
-        return []
-    named = ", ".join(str(line) for line in lines[:MOST_LINES]) + (" ..." if len(lines) > MOST_LINES else "")
-    return [f"the tool cuts with the spindle stopped (M5 or S0) at source lines {named}"]
+    return [f"the tool cuts with the spindle stopped (M5 or S0) at {named_lines(lines)}"] if len(lines) else []

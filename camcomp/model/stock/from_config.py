@@ -37,7 +37,7 @@ def _tool(config: Config, cutter: Cutter, number: int | None) -> ToolShape:
     if cutter.diameter_mm is None:
         name = "the tool" if number is None else f"tool T{number}"
         at = config.at("tool") if number is None else config.at("tools", number)
-        raise ConfigError("CC295", f"{name} has no diameter, so nobody knows what it cuts of the stock", at=at)
+        raise ConfigError("CC295", f"{name} has no diameter, so its cut in the stock is not defined", at=at)
     return ToolShape(
         cutter.type or "flat",
         cutter.diameter_mm,

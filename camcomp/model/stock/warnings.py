@@ -8,10 +8,10 @@ import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Bools, Floats, Ints, Path
+from camcomp.ground.source_lines import named_lines
 from camcomp.model.config.spec import Config
 from camcomp.model.cutting.engaged import Engaged
 
-MOST_LINES = 10
 SHARE, HAIR_MM = 0.01, 0.005  # tolerance of a stated depth or width
 
 
@@ -27,13 +27,19 @@ def stock_remarks(config: Config, path: Path, engaged: Engaged | None) -> Remark
     process, top = config.process, config.workpiece.stock_top_mm
     off: dict[str, Bools] = {}
     if process.depth_mm is not None:
-        off["process: depth_mm contradicts the stock, which counts instead,"] = _off(depth, process.depth_mm)
+        off["the depth in the stock is used, not process: depth_mm (remove the key or correct the stock),"] = _off(
+            depth, process.depth_mm
+        )
     if process.width_mm is not None:
         wide = _widths(config, path, engaged, on)
-        off["process: width_mm contradicts the stock, which counts instead,"] = _off(wide, process.width_mm)
+        off["the width in the stock is used, not process: width_mm (remove the key or correct the stock),"] = _off(
+            wide, process.width_mm
+        )
     if top is not None:
         height = path_geometry.points(path, motion, engaged.u[on])[:, 2]
-        off["workpiece: stock_top_mm contradicts the stock, which counts instead,"] = _off(depth, top - height)
+        off["the top of the stock is used, not workpiece: stock_top_mm (remove the key or correct the stock),"] = _off(
+            depth, top - height
+        )
     flutes = {number: each.flute_length_mm for number, each in config.tools.items()}
     length = _by_tool(path.tool[motion], flutes, config.tool.flute_length_mm, np.inf)
     off["material is left above the flutes of the tool"] = depth > length + HAIR_MM
@@ -42,7 +48,7 @@ def stock_remarks(config: Config, path: Path, engaged: Engaged | None) -> Remark
 
 def stock_warnings(remarks: Remarks) -> list[str]:
     """The remarks as warnings."""
-    return [f"{text} at source lines {_named(lines)}" for text, lines in remarks.items()]
+    return [f"{text} at {named_lines(lines)}" for text, lines in remarks.items()]
 
 
 def _widths(config: Config, path: Path, engaged: Engaged, on: Ints) -> Floats:
@@ -63,7 +69,3 @@ def _by_tool(tool: Ints, of: Mapping[int, float | None], other: float | None, un
 def _off(found: Floats, stated: Floats | float) -> Bools:
     out: Bools = np.abs(found - stated) > SHARE * np.abs(stated) + HAIR_MM
     return out
-
-
-def _named(lines: Ints) -> str:
-    return ", ".join(str(line) for line in lines[:MOST_LINES]) + (" ..." if len(lines) > MOST_LINES else "")

@@ -1,9 +1,12 @@
 """What several commands say in the same words."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from camcomp.compensation.program.result import Summary, Verification
+
+_NO_ACTION = "; nothing to do"
 
 
 def controller_line(figures: "Summary | Verification") -> str:
@@ -14,6 +17,12 @@ def controller_line(figures: "Summary | Verification") -> str:
         f"on the path that the controller drives in {mode}: tip error rms {left.rms_um:.2f} um, max {left.max_um:.2f} um; "
         f"cycle time {times.after:.1f} s, before {times.before:.1f} s"
     )
+
+
+def warning_lines(warnings: Sequence[str]) -> list[str]:
+    """Warnings for the terminal; those that need no action are notes."""
+    kinds = [("note" if each.endswith(_NO_ACTION) else "warning", each) for each in warnings]
+    return [f"{kind}: {each.removesuffix(_NO_ACTION)}" for kind, each in kinds]
 
 
 def expected_error_lines(figures: "Summary | Verification") -> list[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from camcomp.ground import progress
+from camcomp.terminal.commands._figures import warning_lines
 from camcomp.terminal.commands._options import (
     config_option,
     dialect_option,
@@ -72,6 +73,7 @@ def command(
     if scheduler and jobs:
         raise click.UsageError("--jobs is about this machine; a scheduler has its own workers")
     from camcomp.api.batch import compensate_many
+    from camcomp.compensation.batch.programs import ERROR
 
     def on_status(status: Status, number: int, total: int) -> None:
         progress.done(number / total)
@@ -83,16 +85,22 @@ def command(
             paths, configs, output_dir, jobs=jobs, scheduler=scheduler, joints=joints, method=method, tolerance_um=tolerance_um, stock=stock, if_compensated=if_compensated,
             sarif_file=sarif_file, junit_file=junit_file, tell=partial(say, quiet=False), on_status=on_status,
         )  # fmt: skip
-    counts = ", ".join(f"{count} {name}" for name, count in done["counts"].items() if count)
-    say(f"{done['programs']} programs: {counts}", quiet=quiet)
+    counts = ", ".join(
+        f"{count} {name}{'s' if name == ERROR and count > 1 else ''}" for name, count in done["counts"].items() if count
+    )
+    say(f"{done['programs']} program{'' if done['programs'] == 1 else 's'}: {counts}", quiet=quiet)
     out: int = done["exit_code"]
     return out
 
 
 def _tell(status: Status, number: int, total: int) -> None:
+    from camcomp.compensation.batch.programs import DONE
+
     text = f"[{number}/{total}] {status.status}: {status.source}"
     if status.figures:
         before, after = (status.figures[each]["max_um"] for each in ("before", "after"))
         text += f": largest error {before:.1f} um, now {after:.2f} um"
-    warnings = [f"  warning: {each}" for each in status.figures.get("warnings", ())]
+    elif status.status == DONE:
+        text += ": compensated before, copied unchanged"
+    warnings = [f"  {each}" for each in warning_lines(status.figures.get("warnings", ()))]
     say(text, *warnings, *("  " + each["text"].replace("\n", "\n  ") for each in status.messages))

@@ -6,7 +6,7 @@ import click
 
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import display_name
-from camcomp.terminal.commands._figures import controller_line, expected_error_lines
+from camcomp.terminal.commands._figures import controller_line, expected_error_lines, warning_lines
 from camcomp.terminal.commands._options import OUTPUT, dialect_option, quiet_option, stock_option
 from camcomp.terminal.progress import say, working
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from camcomp.api.machine import StockChoice
 
 LEAST_TILT_MRAD = 0.005  # below it the two decimals show none
-LEAST_FIGURE = 1e-9  # mm, rad, N or N mm: smaller figures are rounding errors of zero
+LEAST_FIGURE = 1e-8  # mm, rad, N or N mm: smaller figures are rounding errors of zero
 
 
 @click.command()
@@ -108,8 +108,8 @@ def _finish(figures: "Summary", sizes: dict[str, int], failed: list[tuple[str, s
 
 def _told(figures: "Summary") -> list[str]:
     before, after = figures.before, figures.after
-    changes = ((figures.actuator_change_max_mm, "mm"), (figures.actuator_change_max_rad, "rad"))
-    efforts = ((figures.actuator_force_max_N, "N"), (figures.actuator_torque_max_Nmm, "Nmm"))
+    changes = ((figures.actuator_change_max_mm, "mm", 1.0), (figures.actuator_change_max_rad, "mrad", 1e3))
+    efforts = ((figures.actuator_force_max_N, "N", 1.0), (figures.actuator_torque_max_Nmm, "N m", 1e-3))
     motions = f"{figures.segments_in} motions in, {figures.points} end points out ({figures.method})"
     lines = [
         f"{motions}; {figures.lines_in} lines become {figures.lines_out}",
@@ -139,10 +139,10 @@ def _told(figures: "Summary") -> list[str]:
         lines.append(
             "  state the controller's mode as `control: {path_mode: G64 P0.01}` to have the program written for it"
         )
-    return lines + [f"warning: {each}" for each in figures.warnings]
+    return lines + warning_lines(figures.warnings)
 
 
-def _either(*figures: tuple[float | None, str]) -> str:
-    """The figures that are not zero but for rounding, with their units; a machine may have slides, hinges or both."""
-    parts = [f"{most:.4g} {unit}" for most, unit in figures if most and most > LEAST_FIGURE]
+def _either(*figures: tuple[float | None, str, float]) -> str:
+    """The figures above rounding errors in the units of the text (factors); a machine has slides, hinges or both."""
+    parts = [f"{most * factor:.4g} {unit}" for most, unit, factor in figures if most and most > LEAST_FIGURE]
     return " and ".join(parts) or "0"

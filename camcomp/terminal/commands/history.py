@@ -90,5 +90,5 @@ def _course(each: "ParameterCourse") -> str:
     if each.course == "jumps":
         return f"jumped on {', '.join(str(day) for day in each.changed)}"
     if each.course == "too few":
-        return f"{len(each.values)} of 4 measurements that a course needs"
+        return f"{len(each.values)} of the 4 measurements that a trend needs"
     return f"steady over {len(each.values)} measurements"

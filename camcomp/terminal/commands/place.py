@@ -70,7 +70,8 @@ def command(
         )
     by = "band after compensation (95 %)" if result.judged_by == "band" else "largest error before compensation"
     stated = "not possible" if result.stated.judged_um is None else f"{result.stated.judged_um:.1f} um"
-    say(f"{by}: {result.best.judged_um:.1f} um at {words(result.best)}", f"as stated: {stated}", quiet=quiet)
+    say(f"{by}: {stated} where the machine file puts the program", quiet=quiet)
+    say(f"at best {result.best.judged_um:.1f} um, with its origin at {words(result.best)}", quiet=quiet)
     at = f"[{result.best.x_mm:g}, {result.best.y_mm:g}, {result.best.z_mm:g}]"
     turn = (machine.config.workpiece.rotation_deg or 0.0) + result.best.turn_deg
     say(f"write: workpiece: {{origin_mm: {at}, rotation_deg: {turn:g}}}", quiet=quiet)

@@ -30,8 +30,9 @@ def command(configs: tuple[str, ...], as_json: bool, columns: str | None) -> Non
     try:
         answer_lines(machine, sys.stdin.buffer, sys.stdout.buffer, tally, columns=columns, as_json=as_json)
     finally:
-        print(f"{tally.count} set-points, {tally.text()}{tally.errors} lines with an error", file=sys.stderr)
+        points, lines = ("s" if number != 1 else "" for number in (tally.count, tally.errors))
+        text = f"{tally.count} set-point{points}, {tally.text()}{tally.errors} line{lines} with an error"
+        print(text, file=sys.stderr)
     if tally.errors:
-        raise CheckFailed(
-            "CC605", f"{tally.errors} of the lines were answered with an error; the column `error` says why"
-        )
+        where = "the key `message`" if as_json else "the column `error`"
+        raise CheckFailed("CC605", f"{tally.errors} of the set-points have an error; {where} says why")

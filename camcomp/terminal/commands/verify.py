@@ -6,9 +6,10 @@ import click
 
 from camcomp.ground.errors import CamcompError, CheckFailed
 from camcomp.ground.files import display_name, write_all
+from camcomp.ground.source_lines import named_lines
 from camcomp.report.findings import Case, Finding, findings_of
 from camcomp.report.outputs import findings_files
-from camcomp.terminal.commands._figures import controller_line, expected_error_lines
+from camcomp.terminal.commands._figures import controller_line, expected_error_lines, warning_lines
 from camcomp.terminal.commands._options import OUTPUT, dialect_option, findings_options, quiet_option, stock_option
 from camcomp.terminal.progress import say, working
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from camcomp.api.machine import Program, StockChoice
     from camcomp.compensation.program.result import LineResult
     from camcomp.compensation.program.verify import Verified
+
+_NOT_COMPENSATED = "the program has no stamp of camcomp compensate: compensate it first"
 
 
 @click.command()
@@ -60,14 +63,15 @@ def command(
         if json_file:
             outputs[json_file] = figures.to_json()
         size = figures.residual
-        note = f"residual rms {size.rms_um:.3f} um, max {size.max_um:.3f} um at {figures.points} points"
-        say(f"{note}; {done.joining} joining lines not counted", *_lines_of(done), quiet=quiet)
+        note = f"residual rms {size.rms_um:.2f} um, max {size.max_um:.2f} um at {figures.points} points"
+        joining = f"; {done.joining} joining lines not counted" if done.joining else ""
+        say(note + joining, *_lines_of(done), quiet=quiet)
         say(controller_line(figures), *expected_error_lines(figures), quiet=quiet)
         if not done.worst_um <= tolerance * (1.0 + 1e-9):
             over = [each for each in done.lines if each.judged_um > tolerance]
-            lines = ", ".join(str(each.line) for each in over)
-            text = f"{done.worst_um:.3f} um are left, more than {tolerance:g} um, at source lines {lines}"
-            failure = CheckFailed("CC601", text)
+            lines = named_lines([each.line for each in over])
+            text = f"{done.worst_um:.3f} um are left, more than {tolerance:g} um, at {lines}"
+            failure = CheckFailed("CC601", text, hint=None if done.stamped else _NOT_COMPENSATED)
             findings = [_finding(each, source, tolerance) for each in over]
     except CamcompError as error:
         failure, findings = error, findings_of(error, display_name(corrected))
@@ -81,11 +85,12 @@ def command(
 def _lines_of(done: "Verified") -> list[str]:
     """Text for the terminal: the ten worst source lines, and warnings."""
     worst = [
-        f"  line {each.line}: {each.residual_um:.3f} um in {each.moves} moves (vertex {each.vertex_um:.3f}, "
-        f"chord +{each.chord_um:.3f}, rounding <= {each.rounding_um:.3f}, solver {each.convergence_um:.3f})"
+        f"  line {each.line}: {each.residual_um:.2f} um in {each.moves} move{'' if each.moves == 1 else 's'} "
+        f"(at end points {each.vertex_um:.2f}, between them {each.chord_um:.2f} more; rounding of the words up to "
+        f"{each.rounding_um:.2f})"
         for each in sorted(done.lines, key=lambda e: -e.residual_um)[:10]
     ]
-    return worst + [f"warning: {each}" for each in done.warnings]
+    return worst + warning_lines(done.warnings)
 
 
 def _finding(line: "LineResult", source: "Program", tolerance: float) -> Finding:

@@ -50,7 +50,7 @@ def test_limits_are_reported_with_their_lines_in_degrees(tmp_path):
     done = camcomp("compensate", program, "--config", arm, "-o", tmp_path / "out.nc")
     text = done.stderr.decode()
     assert done.returncode == 1, text
-    assert "CC602" in text and "actuator A3 leaves its travel -120 to 105 deg at source lines 4" in text
+    assert "CC602" in text and "actuator A3 leaves its travel -120 to 105 deg at source line 4" in text
 
 
 def test_out_of_reach_names_the_line(tmp_path):

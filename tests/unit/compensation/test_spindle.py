@@ -52,7 +52,7 @@ def test_a_stopped_spindle_is_warned_of(monkeypatch, how, words, lines):
         warnings = bulk.run(io.BytesIO(text.encode()), len).warnings
     else:
         warnings = simulate(job, program_of(text.encode(), "p.nc", job.config).path, 0.1).warnings
-    expected = f"the tool cuts with the spindle stopped (M5 or S0) at source lines {lines}"
+    expected = f"the tool cuts with the spindle stopped (M5 or S0) at source line{'s' if ',' in lines else ''} {lines}"
     assert told(warnings) == ([expected] if lines else [])
 
 

@@ -324,7 +324,7 @@ def test_a_supervisor_ends_the_stream_and_is_told_what_was_done():
         process.terminate()
         assert process.wait(10) == 128 + signal.SIGTERM
         said = process.stderr.read()
-    assert b"1 set-points" in said and b"0 lines with an error" in said and b"Traceback" not in said
+    assert b"1 set-point," in said and b"0 lines with an error" in said and b"Traceback" not in said
 
 
 def test_what_is_no_number_is_no_answer(monkeypatch, tmp_path):

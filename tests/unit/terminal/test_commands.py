@@ -175,7 +175,7 @@ def test_validate_checks_an_experiment_with_what_it_names(printed, tmp_path):
     (tmp_path / "a.csv").write_text("t_s\n0\n")
     text = "config: [machine.yaml]\nruns:\n  - {name: a, program: a.nc, log: a.csv, cutting: true, started_s: 0}\n"
     (tmp_path / "e.yaml").write_text(text)
-    assert "ok (experiment, 1 runs)" in printed("validate", tmp_path / "e.yaml")
+    assert "ok (experiment, 1 run)" in printed("validate", tmp_path / "e.yaml")
     (tmp_path / "e.yaml").write_text(text.replace("a.csv", "b.csv").replace("a.nc", "b.nc"))
     err = printed("validate", tmp_path / "e.yaml", code=5)
     assert str(tmp_path / "b.csv") in err

@@ -9,7 +9,9 @@ import pytest
 from camcomp.api import diagnosis
 from camcomp.compensation.program.under_control import rest_warning
 from camcomp.compensation.report.page import _caution
+from camcomp.gcode.interpret import read_program
 from camcomp.ground.files import shipped
+from camcomp.ground.source_lines import named_lines
 from camcomp.terminal.cli import run
 from camcomp.terminal.commands import _figures
 from camcomp.terminal.commands.compensate import _either
@@ -86,8 +88,9 @@ def test_a_report_that_passes_by_its_model_alone_says_so():
 
 
 def test_rounding_errors_of_zero_are_printed_as_zero():
-    assert _either((5.027e-88, "N"), (None, "Nmm")) == "0"
-    assert _either((330.94, "N"), (1e-12, "Nmm")) == "330.9 N"
+    assert _either((5.027e-88, "N", 1.0), (None, "N m", 1e-3)) == "0"
+    assert _either((330.94, "N", 1.0), (1e-12, "N m", 1e-3)) == "330.9 N"
+    assert _either((None, "N", 1.0), (1.8811e6, "N m", 1e-3)) == "1881 N m"
 
 
 def test_exact_stops_that_were_written_need_no_action():
@@ -97,3 +100,27 @@ def test_exact_stops_that_were_written_need_no_action():
         == "G61 is written at 1 end of cuts and joining lines: the controller stops there instead of rounding; nothing to do"
     )
     assert "at 2 ends" in rest_warning(2)[0] and rest_warning(0) == []
+
+
+def test_messages_name_one_line_in_the_singular_and_at_most_ten():
+    assert named_lines([4]) == "source line 4" and named_lines([4, 5]) == "source lines 4, 5"
+    assert named_lines(list(range(11))) == "source lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9 ..."
+
+
+def test_warnings_that_need_no_action_are_notes():
+    assert _figures.warning_lines([*rest_warning(1), "cut"])[0].startswith("note: G61 is written at 1 end")
+    assert _figures.warning_lines(["cut"]) == ["warning: cut"]
+
+
+def test_numbers_without_a_point_in_inch_say_inch():
+    program = read_program(b"%\nO1\nG20\nG0 X0. Y0. Z0.\nG1 X10 F10\nM30\n%\n", name="p.nc", dialect="fanuc")
+    assert any(
+        "X10 as 10 inch; a controller that counts increments reads 0.001 inch" in each for each in program.warnings
+    )
+
+
+def test_verify_says_that_a_program_was_never_compensated(tmp_path, capfd):
+    part = tmp_path / "part.nc"
+    part.write_text("G21 G90\nG0 X0 Y0 Z0\nG1 X10 F1000\nM30\n")
+    assert run(["verify", str(part), "--against", str(part), *CARTESIAN]) == 1
+    assert "at source line 3\n  hint: the program has no stamp" in capfd.readouterr().err

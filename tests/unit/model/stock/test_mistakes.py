@@ -137,8 +137,8 @@ def test_what_contradicts_the_stock_is_told_with_its_lines(run, key, good, bad):
         merged = own.rstrip().removesuffix("}") + ", " + line.split("{")[1]
         return run(PASS, *(merged if each is own else each for each in (BOX, TOOL))).warnings
 
-    assert not [each for each in warned(good) if "source lines" in each]
-    assert [each for each in warned(bad) if each.endswith("at source lines 5")]
+    assert not [each for each in warned(good) if "source line" in each]
+    assert [each for each in warned(bad) if each.endswith("at source line 5")]
 
 
 def test_a_stock_about_the_program(run):
