@@ -218,7 +218,7 @@ def machine_with_causes(
     texts[k] = carried(texts[k], texts[:k], result.known)
     note = f"found by camcomp diagnose, verdict {result.verdict}"
     if result.verdict == "ambiguous":
-        note += f": the likeliest of {len(result.alternatives)} sets that explain the data alike"
+        note += f": the likeliest of {len(result.alternatives)} sets that explain the data equally well"
     to = Path.cwd() if target == STANDARD else Path(target).absolute().parent
     return with_causes(
         texts[k], [each for each in result.known if each.effect not in before], folder=str(Path(configs[k]).absolute().parent), moved_to=str(to), note=note,

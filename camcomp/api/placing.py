@@ -31,7 +31,7 @@ class Placed:
 def place(
     program: Program | str | Path | bytes, machine: Job, table: MachineTable, *, stock: StockChoice | None = None
 ) -> Placed:
-    """Compensate a program at places, turns and start postures, and compare what is left.
+    """Compensate a program at places, turns and start postures, and compare the residual errors.
 
     Args:
         program: a program, its file, or its bytes.

@@ -38,7 +38,7 @@ _FEED = {"mm/sec": 60.0, "cm/min": 10.0, "inch/min": 25.4}  # mm/min
 
 @dataclass(frozen=True)
 class LsMove:
-    """What a move keeps of its text: number of its position, whether other moves use it, spans of `P[n]` and of the second line."""
+    """Parts of the text of a move: number of its position, whether other moves use it, spans of `P[n]` and of the second line."""
 
     number: int
     shared: bool

@@ -55,7 +55,7 @@ def code_of(line: str) -> str:
 
 @dataclass(frozen=True)
 class Written:
-    """What a move keeps of its text. rest: configuration and external axes as written; end: index behind the statement."""
+    """Parts of the text of a move. rest: configuration and external axes as written; end: index behind the statement."""
 
     declared: bool
     argument: tuple[int, int]

@@ -6,7 +6,7 @@ from camcomp.gcode.spelling import FANUC
 
 DIALECT = Dialect(
     name="fanuc",
-    title="Fanuc and alike (ISO)",
+    title="Fanuc and controls like it (ISO)",
     marks=(
         (r"^[ \t]*+%?[ \t]*+[O:][ \t]*+\d{1,8}[ \t]*+(\(|$)", 5),
         (r"^[ \t]*+<[^>\n]+>[ \t]*+(\(|$)", 4),

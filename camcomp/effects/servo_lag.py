@@ -14,7 +14,7 @@ from camcomp.model.hysteresis import first_order
 STAGE = "control"
 TARGET = "either"
 PLAIN = "lag of the position loop"
-REMEDY = "raise the gain of the position loop (kv) or switch feed-forward on, alike on all axes; or cut more slowly"
+REMEDY = "raise the gain of the position loop (kv) or switch feed-forward on, the same on all axes; or cut more slowly"
 SOURCE = "first-order position loop, tau = 1/kv (Gross, Hamann, Wiegaertner: Electrical feed drives in automation)"
 _KV = "loop gains kv of 100 to 2000 1/s"
 FITTED = (Parameter("time_constant_ms", "ms", 0.0, 0.0, 100.0, 3.0, 0.005, _KV, sign=1),)

@@ -18,7 +18,12 @@ from camcomp.ground.datatypes import LINE, RAPID, Floats, Ints
 
 # Columns of PlainMotions.begin and Plain.finish.
 X, Y, Z, F, G = range(5)
-ODD, FULL, MORE, END = 0, 1, 2, 3  # why a scan stopped: an odd line, no room, the buffer ends within a line, the end
+NOT_PLAIN, FULL, MORE, END = (
+    0,
+    1,
+    2,
+    3,
+)  # why a scan stopped: a line that is no plain motion, no room, the buffer ends within a line, the end
 LONGEST_END = 4  # bytes of an end of line, CR CR CR LF; see text.END_OF_LINE
 _LARGEST_WORD = 1.0e7  # mm, as the interpreter has it
 _POWERS = 10.0 ** np.arange(23)
@@ -153,7 +158,7 @@ def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, posit
             number = mantissa / _POWERS[decimals]
             value[k] = -number if negative else number
         if not plain:
-            return n, row, at, ODD, code, feed, code_stated, feed_stated
+            return n, row, at, NOT_PLAIN, code, feed, code_stated, feed_stated
         eol = i
         if i < stop and data[i] == 13:
             while i < stop and data[i] == 13 and i - eol < LONGEST_END:
@@ -177,17 +182,17 @@ def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, posit
             speed = value[F] * unit
             fed = True
             if not speed > 0.0:
-                return n, row, at, ODD, code, feed, code_stated, feed_stated
+                return n, row, at, NOT_PLAIN, code, feed, code_stated, feed_stated
         moves = begin[X] >= 0 or begin[Y] >= 0 or begin[Z] >= 0
         if moves and (now < 0 or (now == 1 and not speed > 0.0)):
-            return n, row, at, ODD, code, feed, code_stated, feed_stated
+            return n, row, at, NOT_PLAIN, code, feed, code_stated, feed_stated
         if moves:
             for k in range(3):
                 if begin[k] >= 0 and abs(value[k] * unit) > _LARGEST_WORD:
-                    return n, row, at, ODD, code, feed, code_stated, feed_stated
+                    return n, row, at, NOT_PLAIN, code, feed, code_stated, feed_stated
             height = value[Z] * unit + offset[Z] if begin[Z] >= 0 else position[Z]
             if now == 1 and (position[Z] < top) != (height < top):
-                return n, row, at, ODD, code, feed, code_stated, feed_stated
+                return n, row, at, NOT_PLAIN, code, feed, code_stated, feed_stated
             for k in range(3):
                 out.start[n, k] = position[k]
                 if begin[k] >= 0:

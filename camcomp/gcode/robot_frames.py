@@ -50,7 +50,7 @@ class JointPose:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RobotFrames:
-    """What a machine file says of an arm; by default the base stands in the program frame and the flange is the platform."""
+    """Statements of a machine file about an arm; by default the base stands in the program frame and the flange is the platform."""
 
     program: CoordinateFrame = IDENTITY  # G54 of the machine file in the machine frame
     held: Floats = field(default_factory=lambda: np.eye(3))  # of the platform without words

@@ -1,4 +1,4 @@
-"""What the reader and the writer of robot programs need of one language."""
+"""The parts of one robot language that reader and writer of its programs use."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class RobotLanguage(ABC):
 
     @abstractmethod
     def read(self, reader: Any) -> None:
-        """Tell the reader (a RobotReader) of every move, in order. Raises ProgramError with every mistake."""
+        """Pass every move to the reader (a RobotReader), in order. Raises ProgramError with every mistake."""
 
     @abstractmethod
     def poses(self, values: Floats) -> tuple[Floats, Floats]:

@@ -113,7 +113,7 @@ class RobotWriter:
             self._line(k, row, before=False)
 
     def _passes(self, k: int, first: int, last: int) -> bool:
-        """Whether the statement as it stands says what is wanted."""
+        """Whether the statement already gives the wanted values."""
         path, out, site = self.path, self.out, self.sites[k]
         if path.machine[k]:
             return True
@@ -139,7 +139,7 @@ class RobotWriter:
         self.held = None if site.said is None else np.array(site.said, float)
 
     def _new(self, k: int, row: int, in_place: bool) -> NewMove:
-        """What is to be written for a row; the control holds it from then on."""
+        """Words to write for a row; the control holds it from then on."""
         wanted, held = self.numbers[row], self._holds(self.numbers[row])
         fresh = ~held
         if in_place:

@@ -229,7 +229,7 @@ class CodeFiles:
                 each.unlink()
 
     def leave(self, most: int) -> None:
-        """Delete the oldest files of this name, so that `most` are left."""
+        """Delete the oldest files of this name, so that `most` remain."""
         files = sorted(self.folder.glob(f"{self._base}-*.nbc"), key=lambda each: each.stat().st_mtime)
         for each in files[:-most]:
             each.unlink(missing_ok=True)

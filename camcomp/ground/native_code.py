@@ -84,7 +84,7 @@ def load(name: str, given: ObjectCode) -> Run:
 
 @functools.cache
 def _link() -> Any:
-    """Tell LLVM the helpers of numba. Returns the class of environments, which the wrappers ask for."""
+    """Register the helpers of numba with LLVM. Returns the class of environments, which the wrappers ask for."""
     import llvmlite.binding as llvm
 
     helpers, functions, memory = (

@@ -24,7 +24,7 @@ RULES: dict[str, Rule] = {
     ),
     "CC101": Rule(
         "decimal comma",
-        "Controls read `X1,5` as X1, as X15, or not at all. It is refused so that nobody cuts at the wrong place.",
+        "Controls read `X1,5` as X1, as X15, or not at all. It is refused, because the tool could cut at the wrong position.",
         "write a point",
     ),
     "CC102": Rule(

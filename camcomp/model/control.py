@@ -96,7 +96,7 @@ def _is_robot_program(data: bytes, name: str, dialect: str | None) -> bool:
 
 
 def _with_remarks(program: Program, config: Config | None) -> Program:
-    """The program, with what is to be said of the control that runs it."""
+    """The program with remarks on the control that runs it."""
     if program.language.robot is None or config is None or config.control.absolute_accuracy is not None:
         return program
     return replace(program, warnings=(*program.warnings, ACCURACY_NOT_STATED))

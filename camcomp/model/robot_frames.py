@@ -1,4 +1,4 @@
-"""What a machine file says of its arm to a program in the language of the robot."""
+"""Frames and tools that a machine file states for programs in the language of the robot."""
 
 from __future__ import annotations
 

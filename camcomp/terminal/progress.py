@@ -32,7 +32,7 @@ def lively() -> bool:
 
 @contextmanager
 def working(on: str, *, quiet: bool = False) -> Iterator[None]:
-    """Say what is being worked on, how much of it is done and how long the rest may take; where that is unknown, the time so far.
+    """Show the work in progress, its done share and the expected remaining time; where that is unknown, the time so far.
 
     On a terminal a line is drawn anew after a moment, and wiped at the end. Elsewhere a line is written every 10 s, so that
     logs of CI jobs and services show it. LinuxCNC's AXIS gets the lines that it asks of filters.

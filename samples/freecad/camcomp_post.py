@@ -2,7 +2,7 @@
 
 Arguments of the Job's output: `--config machine.yaml` (needed; may be repeated), `--post linuxcnc` (the post that writes the
 program), `--camcomp COMMAND`, `--report` (a page beside the program). All others go to that post, e.g. `--inches`.
-Tried in FreeCAD 0.20. The names of modules in FreeCAD 1.x are those of its documentation; nobody has tried them yet.
+Tried in FreeCAD 0.20. The names of modules in FreeCAD 1.x are those of its documentation; they have not been tried.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""What MkDocs is told beyond mkdocs.yml: navigation by folders, walk-throughs of samples/ in tutorial/, formulas as MathML.
+"""Hooks of MkDocs beyond mkdocs.yml: navigation by folders, walk-throughs of samples/ in tutorial/, formulas as MathML.
 
 A page appears in the navigation when its file is there. Pages of `samples/` stay beside the files they walk through; the
 site shows them under `tutorial/` at the same place below it, and links to `../../samples/PAGE.md` lead there.
@@ -19,6 +19,7 @@ FOLDERS = {
     "Validation": "validation",
 }
 _TO_SAMPLES = re.compile(r"\]\((?:\.\./)+samples/([^)#]+\.md)")
+_TO_DOCS = re.compile(r"\]\((?:\.\./)+docs/([^)#]+\.md)")
 
 
 def on_config(config: Any) -> Any:
@@ -60,13 +61,10 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Links into samples/ lead to where the site shows those pages."""
-    here = posixpath.dirname(page.file.src_uri)
-
-    def lead(found: re.Match[str]) -> str:
-        return f"]({posixpath.relpath(f'tutorial/{found[1]}', here or '.')}"
-
-    return _TO_SAMPLES.sub(lead, markdown)
+    """Links into samples/, and from there into docs/, lead to where the site shows those pages."""
+    here = posixpath.dirname(page.file.src_uri) or "."
+    markdown = _TO_SAMPLES.sub(lambda found: f"]({posixpath.relpath(f'tutorial/{found[1]}', here)}", markdown)
+    return _TO_DOCS.sub(lambda found: f"]({posixpath.relpath(found[1], here)}", markdown)
 
 
 def _mathml(source: str, *_: Any, **__: Any) -> str:

@@ -111,7 +111,14 @@ def _order(label: str) -> tuple[int, str]:
 
 
 def _plain(text: str) -> str:
-    return re.sub(r"\s+", " ", text).replace("|", "/").replace("<", "&lt;").replace("'", "").replace('"', "")[:240]
+    return (
+        re.sub(r"\s+", " ", text)
+        .replace("|", "/")
+        .replace("<", "&lt;")
+        .replace("[", "&#91;")
+        .replace("'", "")
+        .replace('"', "")[:240]
+    )
 
 
 def plot(results: list[Result]) -> str:

@@ -271,7 +271,7 @@ def default_text(given: FieldInfo) -> str:
 
 
 def example_of(key: str, given: FieldInfo, section: KeySection) -> str:
-    """A value that a file may have, as YAML in one line; empty where nobody has given one."""
+    """A value that a file may have, as YAML in one line; empty without an example."""
     if len(words := get_args(given.annotation)) == 1 and isinstance(words[0], str):
         return words[0]
     if given.examples:

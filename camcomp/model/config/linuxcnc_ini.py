@@ -28,7 +28,7 @@ _LINEAR = "XYZ"
 
 
 def read_ini(data: bytes, name: str) -> Node:
-    """The tree of a machine file that says what an INI file says. Raises ConfigError CC218, CC204, CC205 with the place."""
+    """The tree of a machine file with the statements of an INI file. Raises ConfigError CC218, CC204, CC205 with the place."""
     ini = _Ini(name)
     ini.read(data.decode("utf-8-sig", errors="replace"))
     at = Location(name, 1, 1)
@@ -47,7 +47,7 @@ def read_ini(data: bytes, name: str) -> Node:
 
 
 def with_travel(tree: Node) -> tuple[Node, list[Doubt]]:
-    """A merged tree in which the actuators called like LinuxCNC's axes have their travel, and what was not taken."""
+    """A merged tree in which the actuators called like LinuxCNC's axes have their travel, and doubts about values that were ignored."""
     travel = child(tree, TRAVEL)
     if travel is None:
         return tree, []
@@ -190,7 +190,7 @@ class _Limited:
 
 
 def read_layer(data: bytes, name: str) -> tuple[Node | None, list[CamcompError]]:
-    """The tree of an INI file, or what is wrong with it."""
+    """The tree of an INI file, or its errors."""
     try:
         return read_ini(data, name), []
     except ConfigError as error:

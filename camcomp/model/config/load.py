@@ -241,7 +241,7 @@ def _merged(base: Node, over: Node) -> Node:
 
 
 def _with_other_files(tree: Node) -> tuple[Node, list[Doubt], list[CamcompError]]:
-    """The tree with the travel of LinuxCNC's axes and the tools of tool tables, what is doubtful of them, and errors."""
+    """The tree with the travel of LinuxCNC's axes and the tools of tool tables, doubts, and errors."""
     tree, doubts = linuxcnc_ini.with_travel(tree)
     tree, more, errors = with_tool_tables(tree)
     return tree, doubts + more, errors

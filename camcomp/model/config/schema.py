@@ -39,7 +39,7 @@ _OLDER = {"$defs": "definitions", "prefixItems": "items"}  # newer name -> name 
 
 
 class _Described(GenerateJsonSchema):
-    """Pydantic's schemas, in which every key says what it means, with its unit, default and an example."""
+    """Pydantic's schemas, in which every key has its meaning, unit, default and an example."""
 
     def model_schema(self, schema: Any) -> Schema:
         """Schema of one mapping."""

@@ -254,7 +254,7 @@ class Config(Spec):
 
     @property
     def doubts(self) -> tuple[Doubt, ...]:
-        """What the tool tables of the file contradict or leave open."""
+        """Contradictions and gaps of the tool tables of the file."""
         return self._doubts
 
     @property

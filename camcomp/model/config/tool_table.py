@@ -167,7 +167,7 @@ class _Found:
 
 
 def _over(own: Node, tool: TabledTool, number: int, doubts: list[Doubt]) -> Node:
-    """A tool of the machine file with what it leaves out from the table."""
+    """A tool of the machine file, completed from the table."""
     if not isinstance(own.value, dict):
         return own
     stated = {key: each for key, each in own.value.items() if key != "file"}

@@ -102,7 +102,7 @@ def merged_entries(
 
 
 def _key_of_entry(entry: Any) -> tuple[Any, ...] | None:
-    """`key_of_effect` of an entry as in YAML; None for what is no entry."""
+    """`key_of_effect` of an entry as in YAML; None for another node."""
     if not isinstance(entry, Mapping):
         return None
     plain = {key: _plain(value) for key, value in entry.items()}

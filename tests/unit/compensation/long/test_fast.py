@@ -7,7 +7,7 @@ import pytest
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.numbers import decimals, plain, significant
 from camcomp.gcode.output import Output
-from camcomp.gcode.plain_lines import MORE, ODD, PlainMotions, scan
+from camcomp.gcode.plain_lines import MORE, NOT_PLAIN, PlainMotions, scan
 from camcomp.gcode.plain_rows import MAX_ROW_BYTES, put_decimal, put_feed, write_rows
 from camcomp.gcode.rewrite import rewrite
 from camcomp.ground.datatypes import LINE, RAPID
@@ -92,21 +92,21 @@ def test_inches_and_offsets():
 )  # fmt: skip
 def test_everything_else_is_odd(line):
     (n, rows, at, why, *_), _ = scanned(f"G1 X2\n{line}\nX3\n")
-    assert (n, rows, at, why) == (1, 1, 6, ODD)
+    assert (n, rows, at, why) == (1, 1, 6, NOT_PLAIN)
 
 
 def test_odd_without_a_motion_code_or_a_feed():
-    assert scanned("X1\n", code=-1)[0][3] == ODD
-    assert scanned("G1 X1\n", feed=0.0)[0][3] == ODD
+    assert scanned("X1\n", code=-1)[0][3] == NOT_PLAIN
+    assert scanned("G1 X1\n", feed=0.0)[0][3] == NOT_PLAIN
     assert scanned("G0 X1\n", feed=0.0)[0][0] == 1
 
 
 def test_numbers_without_a_point_can_be_odd():
-    assert scanned("X1.\nX0\nX5\n", pointed=True)[0][:4] == (2, 2, 7, ODD)
+    assert scanned("X1.\nX0\nX5\n", pointed=True)[0][:4] == (2, 2, 7, NOT_PLAIN)
 
 
 def test_a_cut_across_the_top_of_the_stock_is_odd():
-    assert scanned("G1 X2\nG0 Z-1\nG1 X3\nZ2\n", top=1.5)[0][:4] == (3, 3, 19, ODD)
+    assert scanned("G1 X2\nG0 Z-1\nG1 X3\nZ2\n", top=1.5)[0][:4] == (3, 3, 19, NOT_PLAIN)
 
 
 @pytest.mark.parametrize("cut", range(1, 12))
