@@ -289,6 +289,11 @@ class Reduced:
         return len({c.place for c in self.model.candidates})
 
     @property
+    def candidates(self) -> Sequence[PlacedCause]:
+        """All candidates."""
+        return self.model.candidates
+
+    @property
     def usable(self) -> list[int]:
         """Candidates all of whose columns are seen."""
         return [i for i, unit in enumerate(self._unit) if unit.all()]

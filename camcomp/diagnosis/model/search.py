@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from camcomp.diagnosis.model.candidates import Place
-from camcomp.diagnosis.model.evidence import LONG, Members, Reduced
+from camcomp.diagnosis.model.candidates import Place, PlacedCause
+from camcomp.diagnosis.model.evidence import LONG, Members
+from camcomp.ground.datatypes import Floats
 
 MOST = 5  # causes of a set
 KEPT = 12  # sets of each size that are enlarged
@@ -27,12 +29,30 @@ class Visited:
         return max(self.values, key=lambda m: (self.values[m], m))
 
 
-def search_sets(data: Reduced, most: int = MOST, among: Collection[Place] | None = None) -> Visited:
+class WeighedSets(Protocol):
+    """Log posteriors of sets of candidates, of which those `usable` may be members."""
+
+    @property
+    def candidates(self) -> Sequence[PlacedCause]:
+        """All candidates."""
+
+    @property
+    def usable(self) -> Sequence[int]:
+        """Candidates that the data can show."""
+
+    def value(self, members: Members) -> float:
+        """Log posterior of a set, up to a constant."""
+
+    def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
+        """Log posterior (m,) of a set with one of `more` each."""
+
+
+def search_sets(data: WeighedSets, most: int = MOST, among: Collection[Place] | None = None) -> Visited:
     """Sets of up to `most` causes at some places, or all, with their log posteriors.
 
     A set has at most one candidate of more than LONG columns, which is tried with the best set of each size.
     """
-    candidates = data.model.candidates
+    candidates = data.candidates
     usable = [i for i in data.usable if among is None or candidates[i].place in among]
     long = {i for i in usable if len(candidates[i].columns) > LONG}
     values: dict[Members, float] = {(): data.value(())}

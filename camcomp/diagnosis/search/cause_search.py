@@ -11,7 +11,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.verdict import SURE
 from camcomp.diagnosis.search.credible import credibility
-from camcomp.diagnosis.search.fitted_sets import EXCHANGES, FittedSets
+from camcomp.diagnosis.search.fitted_sets import ROUNDS, FittedSets
 from camcomp.diagnosis.search.indistinguishable import likeness, stand_ins
 from camcomp.diagnosis.search.kept_causes import kept_with_unknown
 from camcomp.diagnosis.search.tempering import misfit, tempering
@@ -49,7 +49,6 @@ class CauseSearch:
 def search_causes(problem: Problem) -> CauseSearch:
     """Fit sets, rank them, test the best one for an unmodelled effect, and state probabilities."""
     sets = FittedSets(problem)
-    sets.search()
     weighed = _weigh_answers(problem, sets)
     best = weighed.fits[weighed.verdict.best]
     beside = _look_beside(problem, best, sets)
@@ -76,14 +75,15 @@ class _Weighed:
 
 def _weigh_answers(problem: Problem, sets: FittedSets) -> _Weighed:
     """Sets without small members, with their probabilities and verdict."""
-    for _ in range(EXCHANGES):
+    best = sets.null
+    for _ in range(ROUNDS):
+        sets.search_near(best)
         temperature = tempering(problem, sets.answers()[0])
         fits = tuple(sets.answers(temperature))
         probability = probabilities(fits, problem.candidates, temperature)
         best = fits[int(np.argmax(probability))]
-        if not sets.is_exchangeable(best):
+        if best.members in sets.searched:
             break
-        sets.exchange(best)  # without its weak members a set has rivals of its own
     by_structure = [sets.fit(members) for members in stand_ins(likeness(problem), best.members, best.theta)]
     by_structure = [f for f in by_structure if _of_their_signs(problem, f)]
     fits = tuple(({f.members: f for f in by_structure} | {f.members: f for f in fits}).values())

@@ -3,13 +3,14 @@
 The search knows grams, priors and numbers of candidates; what an candidate is, and how it is re-fitted, its caller says.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import comb, factorial
 
 import numpy as np
 
+from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.statistics.evidence import (
     TOLERANCE_LOG,
     TOLERANCES,
@@ -133,6 +134,11 @@ class Scale:
         self.prior, self.candidates = prior, candidates
         self.bases: list[Base] = [base(data, prior, f) for f in TOLERANCES]
 
+    @property
+    def at_stated(self) -> Base:
+        """The posterior of no cause with the tolerances as stated."""
+        return self.bases[TOLERANCES.index(1.0)]
+
     def __call__(self, members: Members, sought: Mapping[int, Sequence[SoughtShape]] | None = None) -> float:
         """Log evidence of a set; sought: shapes by candidate at whose best values the columns are."""
         values = self._by_tolerance(members, sought or {})
@@ -161,77 +167,33 @@ class Scale:
         return np.asarray(none + np.logaddexp.reduce(each) - log_sum([odds for odds, _ in ways]))
 
 
-def extensions(
-    scale: Scale, members: Members, candidates: Sequence[int], most: int | None = None
-) -> list[tuple[float, Members]]:
-    """The set with one more candidate each: (log evidence + log prior, set), best first; most: only so many, screened before."""
-    more = [
-        tuple(sorted((*members, i)))
-        for i in candidates
-        if i not in members and not any(scale.candidates.exclusive(i, j) for j in members)
-    ]
-    return _scored(scale, more if most is None else _screened(scale, more, most))
+@dataclass(frozen=True, eq=False)
+class LinearSets:
+    """Sets weighed by the evidence linearised about one fit, tolerances as stated; for model/search."""
+
+    scale: Scale
+    usable: Sequence[int]
+    candidates: Sequence[PlacedCause]
+
+    def value(self, members: Members) -> float:
+        """Log evidence plus log prior."""
+        at, columns = self.scale.at_stated, self.scale.candidates.columns
+        causes = [columns[i] for i in members]
+        more = float(log_bayes([at], self.scale.prior, [causes])[0, 0]) if causes else 0.0
+        return at.log_evidence + more + self.scale.candidates.prior(members)
+
+    def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
+        """The same (m,) of a set with one of `more` each, the set's own amplitudes free; -inf where two exclude each other."""
+        scale, known = self.scale, self.scale.candidates
+        own = [c for i in members for c in known.columns[i]]
+        at = freed(scale.at_stated, scale.prior, own) if own else scale.at_stated
+        gains = log_bayes([at], scale.prior, [[known.columns[i]] for i in more])[0]
+        gains += [known.prior(tuple(sorted((*members, i)))) for i in more]
+        gains[[any(known.exclusive(i, j) for j in members) for i in more]] = -np.inf
+        return np.asarray(gains + self.value(members) - known.prior(members), float)
 
 
-def pairs(scale: Scale, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
-    """The best sets of two, best first: screened at the stated tolerances, then scored."""
-    at = scale.bases[TOLERANCES.index(1.0)]
-    two = [each for each in combinations(sorted(candidates), 2) if not scale.candidates.exclusive(*each)]
-    rough = _of_two(scale, at, two) + [scale.candidates.prior(each) for each in two]
-    return _scored(scale, [two[k] for k in np.argsort(-rough)[:most]])
-
-
-def _of_two(scale: Scale, at: Base, two: Sequence[Members]) -> Floats:
-    """Log Bayes factor (p,) of pairs at one base."""
-    columns = scale.candidates.columns
-    return np.asarray(log_bayes([at], scale.prior, [[columns[i] for i in pair] for pair in two])[0])
-
-
-def exchanges(scale: Scale, members: Members, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
-    """The best sets with one member exchanged or omitted, best first: screened, then scored."""
-    near = {tuple(x for x in members if x != i) for i in members}
-    for rest in list(near):
-        near |= {tuple(sorted((*rest, j))) for j in _beside(scale, rest, members, candidates)}
-    return _scored(scale, _screened(scale, sorted(near), most))
-
-
-def parted(scale: Scale, members: Members, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
-    """The best sets with two others in one member's place, best first: what came first may have stood for both.
-
-    Screened at the stated tolerances beside the others, which are free; then scored.
-    """
-    at = scale.bases[TOLERANCES.index(1.0)]
-    found: dict[Members, float] = {}
-    for i in members:
-        rest = tuple(x for x in members if x != i)
-        own = [c for x in rest for c in scale.candidates.columns[x]]
-        free = _beside(scale, rest, members, candidates)
-        two = [each for each in combinations(sorted(free), 2) if not scale.candidates.exclusive(*each)]
-        if not two:
-            continue
-        rough = _of_two(scale, freed(at, scale.prior, own) if own else at, two)
-        rough += float(log_bayes([at], scale.prior, [[own]])[0, 0]) if own else 0.0
-        sets = [tuple(sorted((*rest, *each))) for each in two]
-        rough += [scale.candidates.prior(each) for each in sets]
-        found |= {sets[k]: float(rough[k]) for k in np.argsort(-rough)[:most]}
-    return _scored(scale, sorted(found, key=lambda each: found[each], reverse=True)[:most])
-
-
-def _beside(scale: Scale, rest: Members, without: Members, candidates: Sequence[int]) -> list[int]:
-    """The candidates outside of `without` that may act jointly with all members of a set."""
-    return [j for j in candidates if j not in without and not any(scale.candidates.exclusive(j, x) for x in rest)]
-
-
-def _screened(scale: Scale, sets: Sequence[Members], most: int) -> list[Members]:
-    """The best of sets at the stated tolerances, all members of one width: each one's own takes four times as long per member."""
-    at = scale.bases[TOLERANCES.index(1.0)]
-
-    columns = [[[c for i in each for c in scale.candidates.columns[i]]] if each else [] for each in sets]
-    rough = log_bayes([at], scale.prior, columns)[0] + [scale.candidates.prior(each) for each in sets]
-    return [sets[k] for k in np.argsort(-rough, kind="stable")[:most]]
-
-
-def _scored(scale: Scale, sets: Sequence[Members]) -> list[tuple[float, Members]]:
+def scored(scale: Scale, sets: Iterable[Members]) -> list[tuple[float, Members]]:
     """Log evidence + log prior of sets, best first."""
     return sorted(((scale(each) + scale.candidates.prior(each), each) for each in sets), reverse=True)
 

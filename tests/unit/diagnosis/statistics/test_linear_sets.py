@@ -1,0 +1,51 @@
+"""The best-subset search on sets weighed by linearised evidence."""
+
+import numpy as np
+import pytest
+
+from camcomp.diagnosis.model.candidates import PlacedCause
+from camcomp.diagnosis.model.search import search_sets
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, LinearSets, Scale, scored
+from camcomp.diagnosis.statistics.evidence import Prior, gram
+
+SPRINGS, FORCE, WEIGHT, LENGTH, TWO = (0, 1, 2, 3), 4, 5, 6, 7
+COLUMNS = (*((i,) for i in range(7)), (7, 8))
+TRUTH = (0, 1, FORCE)
+
+
+def sets(D, r, excluded=2):
+    """Sets of the columns D (n, 9) that explain r (n,); a candidate excludes that of two columns."""
+    prior = Prior(np.full(9, 1e-3), np.ones(9), np.zeros(9), np.ones(9), np.full(9, np.inf))
+    known = CausePrior(COLUMNS, np.full(8, -np.log(8.0)), lambda i, j: {i, j} == {excluded, TWO}, (SPRINGS,))
+    places = [PlacedCause(str(i), None, own) for i, own in enumerate(COLUMNS)]
+    return LinearSets(Scale(gram(D, r), prior, known), range(8), places)
+
+
+def drawn(seed):
+    rng = np.random.default_rng(seed)
+    return rng.standard_normal((900, 9)), rng.standard_normal(900)
+
+
+def test_springs_and_force_are_found_though_two_that_undo_one_another_do_nearly_the_same():
+    D, noise = drawn(2)
+    wrong = D[:, list(TRUTH)].sum(axis=1)
+    D[:, WEIGHT] = wrong + D[:, LENGTH] + 0.15 * D[:, WEIGHT]
+    data = sets(D, wrong + noise)
+    assert search_sets(data).best == TRUTH
+    assert scored(data.scale, [(WEIGHT, LENGTH), TRUTH])[0][1] == TRUTH
+
+
+def test_a_cause_of_two_columns_is_found_and_never_jointly_with_one_that_it_excludes():
+    D, noise = drawn(3)
+    r = D[:, 0] + D[:, 7] - D[:, 8] + noise
+    assert search_sets(sets(D, r)).best == (0, TWO)
+    found = search_sets(sets(D, r, excluded=0))
+    assert found.best == (TWO,)
+    assert not [members for members in found.values if {0, TWO} <= set(members)]
+
+
+def test_one_more_member_is_worth_what_the_larger_set_is():
+    D, noise = drawn(4)
+    data = sets(D, 0.3 * D[:, 0] + 0.2 * D[:, FORCE] + noise)
+    more = data.with_one_more((0,), [1, FORCE])
+    assert more == pytest.approx([data.value((0, 1)), data.value((0, FORCE))], abs=1.0)
