@@ -47,7 +47,6 @@ from camcomp.diagnosis.result.types import (
 )
 from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
 from camcomp.diagnosis.search.indistinguishable import classes, likeness
-from camcomp.diagnosis.search.kept_causes import ROWS_OF_AN_INSTANT
 from camcomp.diagnosis.search.unexplained import worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.standards import of_runs
@@ -61,6 +60,7 @@ from camcomp.model.effect import Cause
 from camcomp.model.job import Job
 from camcomp.model.motion.twin import Twin
 
+ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
 MOSTLY_ONE_ACTUATOR = 0.6  # share of what is unknown from which on it is one actuator's
 VIBRATION_SHARE = 0.4  # of the gap in one line of the spectrum
 UNTESTED = 0.1  # of the leader's probability: what a set that explains alike counts as at least

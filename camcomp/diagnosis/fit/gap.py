@@ -110,17 +110,6 @@ def rest_by_actuator(problem: Problem, f: Fitted, kind: str) -> dict[str, float]
     return places.shares(dict(zip(names, energy.tolist(), strict=True)))
 
 
-def tip_by_actuator(problem: Problem, f: Fitted, i: int) -> dict[str, float]:
-    """Energy of one member's tip motion, converted to carriage motion, as shares by actuator."""
-    names, at, index = problem.bench.actuators, problem.member_columns(f.members), problem.member_columns((i,))
-    theta = f.theta[[at.index(c) for c in index]]
-    energy = np.zeros(len(names))
-    for k, residual in enumerate(problem.residuals):
-        moved = (problem.columns.blocks[k][:, index] @ theta).reshape(-1, len(residual))[:3].T
-        energy += np.sum(_of_carriages(problem, k, moved) ** 2, axis=0)
-    return places.shares(dict(zip(names, energy.tolist(), strict=True)))
-
-
 def _of_carriages(problem: Problem, k: int, tip: Floats) -> Floats:
     """Motion of the carriages (n, m) that makes one of the tip (n, 3) in run k."""
     return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(problem.bench.thin_slopes(k)), tip))

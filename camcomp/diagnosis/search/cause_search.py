@@ -13,10 +13,9 @@ from camcomp.diagnosis.model.verdict import SURE
 from camcomp.diagnosis.search.credible import credibility
 from camcomp.diagnosis.search.fitted_sets import ROUNDS, FittedSets
 from camcomp.diagnosis.search.indistinguishable import likeness, stand_ins
-from camcomp.diagnosis.search.kept_causes import kept_with_unknown
 from camcomp.diagnosis.search.tempering import misfit, tempering
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
-from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
+from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
     Members,
@@ -158,7 +157,7 @@ def _credible(
     instead = False
     while True:
         unknown = unknown_kind(problem, f, beyond) is not None
-        kept = kept_with_unknown(problem, f, beyond) if unknown else f.members
+        kept = foretelling(problem, f) if unknown else f.members
         if kept == f.members:
             credible = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
             replaced = credible.replaced

@@ -57,24 +57,6 @@ def _held(prior: Prior, columns: Ints) -> Prior:
     return replace(prior, tolerance=tolerance)
 
 
-def signal_rms(problem: Problem, f: Fitted, members: Members | None = None) -> dict[str, float]:
-    """Root mean square of the members' contribution (all, or the given ones) per kind of channel, in units of the
-    noise.
-    """
-    index = problem.member_columns(f.members)
-    mine = set(problem.member_columns(f.members if members is None else members))
-    theta = np.array([t if c in mine else 0.0 for c, t in zip(index, f.theta, strict=True)])
-    out = {}
-    for kind, words in enumerate(problem.dictionaries):
-        energy = rows = 0.0
-        for W, parts in zip(problem.white, problem.white_patterns, strict=True):
-            first = sum(len(each) for each in parts[:kind])
-            signal = W[first : first + len(parts[kind]), index] @ theta
-            energy, rows = energy + float(signal @ signal), rows + len(signal)
-        out[words.kind] = float(np.sqrt(energy / max(rows, 1.0)))
-    return out
-
-
 def rows_by_kind(problem: Problem) -> dict[str, int]:
     """White rows of all runs, per kind of channel."""
     counts = zip(*([len(part) for part in parts] for parts in problem.white_patterns), strict=True)
