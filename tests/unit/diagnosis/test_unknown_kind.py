@@ -11,8 +11,7 @@ from camcomp.diagnosis.statistics.cause_sets import Fitted
 
 PROBLEM = SimpleNamespace(
     floor=SimpleNamespace(tip_um=5.0),
-    member_columns=list,
-    size_um=lambda index, theta: abs(float(np.sum(theta))),
+    moved_um=lambda f, members=(0, 1): abs(float(np.sum(f.theta[list(members)]))),
 )
 
 
