@@ -9,9 +9,9 @@ from __future__ import annotations
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.search import search_sets
+from camcomp.diagnosis.search.linear_sets import LinearSets
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
-    LinearSets,
     Members,
     Scale,
     scored,

@@ -8,11 +8,11 @@ import pytest
 
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.search import search_sets
+from camcomp.diagnosis.search.linear_sets import LinearSets
 from camcomp.diagnosis.statistics.cause_sets import (
     SIZES,
     CausePrior,
     Fitted,
-    LinearSets,
     Scale,
 )
 from camcomp.diagnosis.statistics.evidence import Prior, gram

@@ -5,7 +5,8 @@ import pytest
 
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.search import search_sets
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, LinearSets, Scale, scored
+from camcomp.diagnosis.search.linear_sets import LinearSets
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale, scored
 from camcomp.diagnosis.statistics.evidence import Prior, gram
 
 SPRINGS, FORCE, WEIGHT, LENGTH, TWO = (0, 1, 2, 3), 4, 5, 6, 7
