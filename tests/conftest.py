@@ -18,7 +18,7 @@ _MEASURED: set[Path] = set()  # files of which a test was traced
 
 
 def pytest_configure():
-    """What is ignored here would be ignored by every command that a test starts; what is handled is not."""
+    """Signals that are ignored here are ignored by every command that a test starts; handled ones are not."""
     for number in (signal.SIGINT, signal.SIGHUP):
         if signal.getsignal(number) == signal.SIG_IGN:
             signal.signal(number, lambda *_: None)
@@ -61,7 +61,7 @@ def traced(item):
 
 @pytest.fixture(scope="session", autouse=True)
 def sample_experiments_are_diagnosed_once():
-    """What a process has found for the files of a sample experiment is found for the same files again."""
+    """The diagnosis of a sample experiment, kept per process for the same files."""
     from camcomp.api import diagnosis as api
     from camcomp.diagnosis import diagnose as module
 

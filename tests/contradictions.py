@@ -40,5 +40,5 @@ def contradictions(result):
 
 
 def _is_of_positions(gap):
-    """Whether the gap is one of positions; that of logs of forces alone is stated in mN, and a force may show what no position does."""
+    """Whether the gap is one of positions; that of logs of forces alone is stated in mN, and a force may show more than positions."""
     return not gap["actuators"] or any(each["rms"] > each["floor"] for each in gap["actuators"].values())

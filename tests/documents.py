@@ -32,7 +32,7 @@ class Command:
 
 @dataclass
 class TypedFile:
-    """A file that the reader is told to make."""
+    """A file that the reader makes."""
 
     name: str
     text: str
@@ -68,7 +68,7 @@ def text_blocks(document):
 
 
 def missing(promised, printed):
-    """The first promised line that is not printed where it should be, or None."""
+    """The first promised line that is missing in the printed text, or None."""
     lines, at, loose = printed.splitlines(), 0, False
     for promise in promised:
         if promise.strip() == "...":
@@ -84,7 +84,7 @@ def missing(promised, printed):
 
 
 class Reader:
-    """Somebody at a shell in `folder`, with this camcomp and nothing else installed by pip than what they install."""
+    """A user at a shell in `folder`, with this camcomp and the packages that they install."""
 
     def __init__(self, folder, tools):
         self.folder = folder
@@ -109,7 +109,7 @@ class Reader:
         }
 
     def give(self, command):
-        """Run a command; what it printed, errors included, in the order of writing, without lines of progress."""
+        """Run a command and return its output and errors in the order of writing, progress removed."""
         self.installs |= command.text.startswith("pip ")
         if command.text.startswith("camcomp ") and not self.installs and not _OF_A_SHELL.search(command.text):
             done = camcomp(*shlex.split(command.text)[1:], cwd=self.folder, together=True)

@@ -27,7 +27,7 @@ def by_curvature(points: np.ndarray, tolerance: float) -> int:
 
 
 def by_reach(points: np.ndarray, tolerance: float) -> int:
-    """Lines whose vertices stand anywhere within the tolerance, at `points` (n, 3) or beside them, found by search.
+    """Lines whose vertices stand anywhere within the tolerance, at `points` (n, 3) or near them, found by search.
 
     From every state (a vertex at one of several distances from the curve) all lines that keep the points in between
     within the tolerance are tried; of the ends that so many lines reach, the farthest of every distance goes on.

@@ -206,7 +206,7 @@ def too_long(number: int, frame: object) -> None:
 
 
 def options() -> argparse.Namespace:
-    """What the user wants."""
+    """The result that the user expects."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=0)

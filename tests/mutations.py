@@ -1,4 +1,4 @@
-"""Inputs as nobody writes them: YAML, experiments, logs and URDFs changed at random, from a seed.
+"""Inputs that no user writes: YAML, experiments, logs and URDFs changed at random, from a seed.
 
 Each function takes a random source and the bytes of a good file and returns changed ones.
 """

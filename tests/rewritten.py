@@ -9,7 +9,7 @@ from camcomp.ground.orientation import TURN, rotations_of
 
 
 def written_poses(program, read, seed, turned):
-    """What is written, once it reads as what was wanted: tips within 0.1 um, rotations within `turned` (rad)."""
+    """The written program, which reads as wanted: tips within 0.1 um, rotations within `turned` (rad)."""
     rng, same = np.random.default_rng(seed), Output.same(program.path)
     rows = np.repeat(np.arange(len(program.path)), [1, *rng.integers(1, 4, len(program.path) - 1)])
     n = len(rows)

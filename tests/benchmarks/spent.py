@@ -1,4 +1,4 @@
-"""What a process takes: wall time, processor time, memory."""
+"""Time and memory of a process: wall time, processor time, memory."""
 
 import os
 import subprocess

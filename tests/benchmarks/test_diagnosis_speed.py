@@ -47,7 +47,7 @@ def experiment(folder, kind, rows):
 
 
 def diagnosed(tree, path):
-    """What a diagnosis by the camcomp of a tree takes."""
+    """Time of a diagnosis by the camcomp of a tree."""
     with pytest.MonkeyPatch.context() as patch:
         for threads in ("OMP", "OPENBLAS", "NUMBA"):
             patch.setenv(f"{threads}_NUM_THREADS", "1")

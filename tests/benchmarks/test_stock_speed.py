@@ -1,4 +1,4 @@
-"""What a stock costs: `python -m pytest tests/benchmarks/test_stock_speed.py -m benchmarks -s`.
+"""Cost of a stock: `python -m pytest tests/benchmarks/test_stock_speed.py -m benchmarks -s`.
 
 Programs of short moves that cut nearly all the way, through a block of 300 x 300 x 60 mm at the default resolution, with
 and without the block in turns; ratios within one run, start-up included.

@@ -78,7 +78,7 @@ def hooks(effect):
 
 
 def away(effect):
-    """Parameters one typical size from nominal; shapes and phases stay, and what acts for a while acts in the middle."""
+    """Parameters one typical size from nominal; shapes and phases stay, and temporary effects act in the middle."""
     values = nominal(effect)
     fitted = getattr(effect, "FITTED", effect.PARAMETERS)
     out = {p.name: p.nominal if p.scan else p.value(p.scale) for p in fitted}

@@ -1,4 +1,4 @@
-"""What every force model of the shelf promises, whatever its physics."""
+"""Promises of every force model of the shelf, whatever its physics."""
 
 from pathlib import Path
 from typing import Any

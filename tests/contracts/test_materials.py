@@ -1,4 +1,4 @@
-"""What every file of config/materials promises."""
+"""Promises of every file of config/materials."""
 
 import re
 from pathlib import Path

@@ -118,7 +118,7 @@ USED = ("--config", "use.yaml")
 
 
 def complaint(shelf_name, put, source, capsys, **how):
-    """Listed, a bad plug-in is a warning; not used, it harms nobody; used, it is an error of exit 2. What is said of it."""
+    """Listed, a bad plug-in is a warning; unused, it changes no result; used, it is an error of exit 2. What is said of it."""
     name = put(shelf_name, source, **how)
     with pytest.warns(PluginWarning, match=f"entry point {name} = ") as told:
         assert name not in dict(shelf.usable(shelf_name))
@@ -456,7 +456,7 @@ def test_what_a_robot_returns_is_told_like_any_other_mistake(put, capsys):
 
 
 def test_an_effect_that_fails_on_the_runs_is_no_candidate_and_breaks_no_diagnosis(put, capsys):
-    """Nobody named it; on the trial machines it works."""
+    """It is not named by the experiment; on the trial machines it works."""
     source = changed(
         EFFECT, "    return tip if", "    if len(tip) != 41:\n        raise ValueError('odd')\n    return tip if"
     )

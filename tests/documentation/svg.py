@@ -43,7 +43,7 @@ class Drawing:
         self.parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" fill="{color}"/>')
 
     def word(self, point, text, color=INK, anchor="start", size=14):
-        """Words beside a point."""
+        """Words next to a point."""
         x, y = self.at(*point)
         self.parts.append(
             f'<text x="{x:.1f}" y="{y:.1f}" fill="{color}" font-size="{size}" text-anchor="{anchor}">{escape(text)}</text>'

@@ -34,7 +34,7 @@ def test_commands_of_a_page_print_what_stands_there(path, reader):
 
 
 def test_the_readme_is_followed(reader):
-    """Its commands run in a copy of the checkout; setting up and testing are what is happening anyway."""
+    """Its commands run in a copy of the checkout, without those that set up and test."""
     for name in ("config", "samples"):
         shutil.copytree(ROOT / name, reader.folder / name)
     printed = []

@@ -25,7 +25,7 @@ def server(request, server_path):
 
 
 def offered(server, text):
-    """What is offered at the end of a text."""
+    """Completions at the end of a text."""
     lines = text.split("\n")
     return server.offered(server.open(text + "\n"), len(lines) - 1, len(lines[-1]))
 

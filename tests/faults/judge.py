@@ -26,7 +26,7 @@ class Verdict:
 
 @dataclass
 class Project:
-    """Folders with a machine and a program, and what is made of them when nothing happens."""
+    """Folders with a machine and a program, and their outputs of an undisturbed run."""
 
     folder: Path
     more: dict[str, bytes] = field(default_factory=dict)  # further files by name
@@ -79,7 +79,7 @@ def contents(folder):
 
 
 def wrong(ended, signals=()):
-    """What is wrong with the end of a process, apart from its files."""
+    """Faults of the end of a process, apart from its files."""
     if ended.hung:
         return "it hangs"
     if ended.code not in (*CODES, *(-number for number in signals), *(128 + number for number in signals)):
@@ -91,7 +91,7 @@ def wrong(ended, signals=()):
 
 
 def damage(before, after, expected, *, leftovers=False):
-    """What is wrong with the files; expected: whole outputs by name. leftovers: a nameless file may have got a name."""
+    """Faults of the files; expected: whole outputs by name. leftovers: a nameless file may have got a name."""
     for name, data in before.items():
         if after.get(name) != data and name not in expected:
             return f"{name} was changed"

@@ -50,7 +50,7 @@ class Shot:
 
 
 def camcomp(words, folder, fault=None, shot=None, stdin=""):
-    """Runs one command line in `folder`; what it says is kept outside of it."""
+    """Runs one command line in `folder`; its output is kept outside of the folder."""
     said = folder.with_name(folder.name + ".said")
     process = _context.Process(
         target=_child, args=([str(w) for w in words], str(folder), str(said), fault or Fault(), stdin)

@@ -1,4 +1,4 @@
-"""What has gone wrong in other tools that rewrite G-code, each failure class once (F1 to F16).
+"""Failures of other tools that rewrite G-code, each failure class once (F1 to F16).
 
 Classes: applied twice, arcs mangled, planes mixed, rapids forgotten, unknown start, machine moves changed, feeds turned
 into moves, wrong speed, long lines bent, units lost, silence, wrong sign, lost moves, rounding, bytes changed, order.

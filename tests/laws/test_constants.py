@@ -1,4 +1,4 @@
-"""Every tuned number of the diagnosis stands in one table, with what it decides and where it comes from."""
+"""Every tuned number of the diagnosis is in one table, with its decision and its source."""
 
 import ast
 from pathlib import Path
@@ -28,7 +28,7 @@ def is_number(node):
 
 
 def constants(name, tree):
-    """Names with the text of their values, of what a module assigns at its top and makes of numbers."""
+    """Names and texts of the numbers that a module assigns at its top."""
     for node in tree.body:
         if not isinstance(node, (ast.Assign, ast.AnnAssign)) or node.value is None:
             continue

@@ -34,7 +34,7 @@ CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
 def test_contributing_tells_the_checks_that_are_run():
-    """What takes minutes is compared with what runs it; the rest is done below."""
+    """Commands of minutes are compared with their runners; all others run below."""
     told = [step.text for step in steps(CONTRIBUTING)]
     ci = (ROOT / ".ci/run").read_text(encoding="utf-8")
     done_anyway = (
@@ -107,7 +107,7 @@ def test_links_of_a_page_lead_somewhere(path):
 
 @pytest.mark.parametrize("path", sorted(DOCS.rglob("*.md")), ids=lambda path: path.relative_to(DOCS).as_posix())
 def test_pages_of_the_documentation_link_to_pages_only(path):
-    """What is not under docs/ or a page of samples/ is named and not linked: the built site has only these."""
+    """Pages outside of docs/ and samples/ are named and not linked: the built site has only these."""
     for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text(encoding="utf-8")):
         other = (path.parent / target).resolve()
         inside = other.is_relative_to(DOCS) or (other.is_relative_to(ROOT / "samples") and other.suffix == ".md")

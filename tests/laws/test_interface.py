@@ -16,7 +16,7 @@ HEAVY = ("click", "joblib", "numba", "numpy", "pandas", "plotly", "pydantic", "p
 
 
 def strangers(text):
-    """What a verb imports of camcomp beside the interface, the ground, the findings and the terminal itself."""
+    """Imports of a verb other than the interface, the ground, the findings and the terminal itself."""
     out = []
     for node in ast.walk(ast.parse(text)):
         names = [node.module] if isinstance(node, ast.ImportFrom) else []

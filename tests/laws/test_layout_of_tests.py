@@ -1,4 +1,4 @@
-"""Every folder of tests says what it is for, and what a test imports from other tests is there."""
+"""Every folder of tests states its purpose, and modules that tests import from tests exist."""
 
 import ast
 from importlib.util import find_spec

@@ -228,7 +228,7 @@ def test_an_effect_that_one_of_them_does_not_know_is_caught(hook):
 
 
 class Recorder:
-    """An effect with every hook, which does nothing but note who asked."""
+    """An effect with every hook, which only notes its calls."""
 
     PARAMETERS = ()
 
@@ -248,7 +248,7 @@ class Recorder:
 
 
 def asked(run):
-    """Hooks in the order in which they were first called, but for those that say what the machine and the clock are."""
+    """Hooks in the order of their first call, without those of the machine and the clock."""
     recorder = Recorder()
     run([Cause("recorder", recorder, None)])
     return [hook for hook in recorder.asked if hook not in ("on_robot", "on_clock")], set(recorder.asked)

@@ -1,4 +1,4 @@
-"""The list of modules that no test reached holds those of which no function ran."""
+"""The list of unreached modules holds those without a function that ran."""
 
 from tests.unreached import modules
 

@@ -25,7 +25,7 @@ CIRCLE, FAST = 3, 49.0  # line of the program; mm/s
 
 
 class LateError(Exception):
-    """The machine holds because the solver was late, although nobody disturbed it."""
+    """The machine holds, only because the solver was late."""
 
 
 class BusyError(Exception):
@@ -103,7 +103,7 @@ def released():
 
 
 def recover():
-    """What an operator does about an error."""
+    """The reaction of an operator to an error."""
     COMMAND.abort()
     COMMAND.wait_complete()
     switch_off()
@@ -112,7 +112,7 @@ def recover():
 
 
 def finished(seconds=60.0):
-    """Waits for the end of what was commanded. Raises LateError."""
+    """Waits for the end of the command. Raises LateError."""
     end = time.time() + seconds
     while COMMAND.wait_complete(0.1) == -1 or state().interp_state != linuxcnc.INTERP_IDLE or not state().inpos:
         if is_on("camcomp.error"):
@@ -130,7 +130,7 @@ def mdi(*codes):
 
 
 def patiently(what):
-    """What a function answers, again where the solver was late."""
+    """The answer of a function, asked again where the solver was late."""
     for _ in range(TRIES):
         try:
             released()
@@ -162,7 +162,7 @@ def push(force):
 
 
 def stepped(code):
-    """What HAL says at rest behind lines of G-code. Raises LateError."""
+    """Pins of HAL at rest behind lines of G-code. Raises LateError."""
     mdi(*code.splitlines())
     row = {
         "code": code,
@@ -363,7 +363,7 @@ def opened(task):
 
 
 def main():
-    """Does what the file says and writes beside it what came out."""
+    """Follows the file and writes the results next to it."""
     with open(os.environ["SCREEN"], encoding="utf-8") as file:
         task = json.load(file)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)

@@ -123,7 +123,7 @@ def simulate(folder, scenario, **settings):
 
 
 def recording(path):
-    """What was recorded: an array per column of RECORDED, a row per servo period; none may be missing."""
+    """The recording: an array per column of RECORDED, a row per servo period; none may be missing."""
     lines = Path(path).read_text().splitlines()
     rows = np.array([line.split() for line in lines if len(line.split()) == len(RECORDED)], float)
     assert len(rows) and (np.diff(rows[:, 0]) == 1).all(), "servo periods are missing in the recording"

@@ -87,7 +87,7 @@ def test_the_third_opening_cuts_a_circle_below_three_micrometres_on_a_machine_wi
 
 
 def set_up(folder):
-    """The machine, its files, and nothing that is typed later."""
+    """The machine and its files, without later commands."""
     simulator.machine(folder, shipped("config/cartesian.yaml"))
     (folder / "machine.hal").write_text(HAL)
     ini = (folder / "machine.ini").read_text()
@@ -103,7 +103,7 @@ def set_up(folder):
 
 
 def learn(folder, recording):
-    """What a user starts behind a run."""
+    """The command that a user starts behind a run."""
     env = os.environ | {"PATH": f"{folder}:{os.environ['PATH']}"}
     done = subprocess.run(["./learn", recording], cwd=folder, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -39,7 +39,7 @@ RAMP = 0.6  # um by which LinuxCNC's planner of offsets stays behind: (v + a T)^
 
 @pytest.mark.ecosystem  # test_simulator.py runs the loop on a Cartesian machine
 def test_corrections_follow_a_program_through_pause_abort_new_offsets_and_faults():
-    """What the kernel does to a simulated control between two servo periods is not all recorded: runs may be disturbed.
+    """The record of a simulated control has gaps between two servo periods: runs may be disturbed.
 
     A defect of camcomp or of the sample shows in every run, so the last one decides.
     """

@@ -75,7 +75,7 @@ def test_one_changed_motion_leaves_the_lines_before_it_alone(seed):
 
 
 def check_written(program, out, resolution):
-    """What was written leads, line by line, where it says; and it says what was wanted, up to rounding."""
+    """The written program leads, line by line, to its words, which are the wanted ones up to rounding."""
     written = rewrite(program, out, resolution_mm=resolution, version="1")
     after = read(written.data, "out.ngc").path
     movable = (program.path.known & ~program.path.machine)[out.motion]

@@ -89,7 +89,7 @@ class Browser:
         self._call("POST", f"{self.session}/element/{element}/value", {"text": "".join(keys)})
 
     def tab(self):
-        """Press the tab key wherever the focus is; the id or tag of what has it then."""
+        """Press the tab key and return the id or tag of the element with the focus."""
         keys = [{"type": "keyDown", "value": "\ue004"}, {"type": "keyUp", "value": "\ue004"}]
         self._call("POST", f"{self.session}/actions", {"actions": [{"type": "key", "id": "k", "actions": keys}]})
         return self.run("const e = document.activeElement; return e.id || e.tagName")

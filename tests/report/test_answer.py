@@ -1,4 +1,4 @@
-"""What a diagnosis says on the terminal: the same as its JSON, in words."""
+"""Text of a diagnosis on the terminal: the same as its JSON, in words."""
 
 import json
 import re

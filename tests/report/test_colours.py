@@ -1,4 +1,4 @@
-"""The colours of a report can be told apart by everybody and stand out from the paper, in both themes."""
+"""Every reader can distinguish the colours of a report from each other and from the paper, in both themes."""
 
 import re
 from importlib.resources import files

@@ -1,4 +1,4 @@
-"""SARIF, JUnit and JSON of validate, verify and batch, and what a code host and a CI server require of them."""
+"""SARIF, JUnit and JSON of validate, verify and batch, as a code host and a CI server require them."""
 
 import json
 from xml.etree import ElementTree as xml

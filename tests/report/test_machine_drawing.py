@@ -21,7 +21,7 @@ MACHINES = sorted(
 
 
 def legs(path, off):
-    """Legs of a machine at its programmed origin and somewhat beside it: (drawn, chain, reference, coordinates)."""
+    """Legs of a machine at its programmed origin and near it: (drawn, chain, reference, coordinates)."""
     job = Job(load_config([str(path)]))
     robot = job.machine.nominal
     tip = job.frame.origin + job.frame.rotation @ np.array(off)

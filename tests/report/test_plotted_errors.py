@@ -1,4 +1,4 @@
-"""What the compensation page draws is what its headline and the summary say, whatever the model is made of."""
+"""The plots of the compensation page agree with its headline and the summary, for every kind of model."""
 
 import json
 

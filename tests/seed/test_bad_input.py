@@ -49,7 +49,7 @@ BAD_MACHINES = {
 
 
 def refused(capsys, tmp_path, words):
-    """Exit code and message of a compensation that must write nothing."""
+    """Exit code and message of a compensation without output."""
     outputs = [tmp_path / name for name in ("out.nc", "joints.csv", "paths.csv", "summary.json")]
     options = ["-o", "--joints", "--paths", "--summary"]
     code = run(["compensate", *words, *(str(w) for pair in zip(options, outputs, strict=True) for w in pair)])

@@ -1,4 +1,4 @@
-"""Where nothing has to be corrected nothing is: same bytes, arcs stay arcs."""
+"""A program without deflection is not changed: same bytes, arcs stay arcs."""
 
 import pytest
 

@@ -161,7 +161,7 @@ def test_what_goes_wrong_for_lack_of_memory_is_no_bug(verb, capsys, monkeypatch)
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
 def test_a_signal_ends_a_command_in_the_middle_and_leaves_nothing(tmp_path, number, code):
-    """It is waiting for its program with an output open beside its target: on a system whose files all have names."""
+    """It is waiting for its program with an output open next to its target: on a system whose files all have names."""
     script = (
         "import os, sys; vars(os).pop('O_TMPFILE', None); from camcomp.ground import files; from camcomp.terminal import cli\n"
         "import click\n"

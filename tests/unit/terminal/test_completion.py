@@ -1,4 +1,4 @@
-"""What a shell offers behind <TAB>, asked for as bash, zsh and fish ask."""
+"""Completions of bash, zsh and fish behind <TAB>."""
 
 import os
 import subprocess
@@ -36,7 +36,7 @@ def asked(shell, words):
 
 
 def offered(shell, printed):
-    """(kind, value) of what is offered."""
+    """(kind, value) of every completion."""
     lines = printed.splitlines()
     if shell == "zsh":
         return list(zip(lines[::3], lines[1::3], strict=True))

@@ -1,4 +1,4 @@
-"""What verbs print says what was done and what a user can do, in one reading."""
+"""Printed lines state the result and the possible action, in one reading."""
 
 import json
 import sys

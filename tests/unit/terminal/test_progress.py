@@ -186,7 +186,7 @@ def assert_rising(shares, watched, least=3):
 
 @pytest.mark.parametrize("verb", ["simulate", "import"])
 def test_verbs_tell_it_on_a_terminal_and_nowhere_else(screen, tmp_path, monkeypatch, verb):
-    """The work takes as long as it takes; what is watched is that somebody watches."""
+    """The duration of the work is free; the display of its progress is tested."""
     told = []
     monkeypatch.setattr(progress._Line, "text", lambda self, reported: told.append(self._on) or self._on)
     pause = reported.done
@@ -270,7 +270,7 @@ def test_a_batch_says_how_far_it_is(screen, tmp_path, monkeypatch):
 
 
 def test_compiling_is_told_for_what_it_is(tmp_path):
-    """A first run in an installation without machine code says so; the second has nothing to compile."""
+    """A first run in an installation without machine code says so; the second compiles no code."""
     code = """
 import numpy as np, sys
 from camcomp.ground import progress as reported
