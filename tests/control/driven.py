@@ -1,4 +1,4 @@
-"""What LinuxCNC made of a corrected program, and what the model says that it makes of it.
+"""The motion of LinuxCNC on a corrected program, measured and predicted by the model.
 
 A file of data/ holds the corrected program, its end points with their targets and forces, and the tip that was commanded while it
 ran, every millisecond in steps of 10 nm as second differences.
@@ -76,7 +76,7 @@ class Account:
 
 
 def account(driven: Driven, machine: Job) -> Account:
-    """The truth plant on the recorded motion beside the model on the program's text."""
+    """The truth plant on the recorded motion and the model on the program's text."""
     program = program_of(driven.program.tobytes(), "recorded.nc", machine.config)
     path, tip = program.path, driven.tip
     moving = np.flatnonzero(np.any(np.diff(tip, axis=0) != 0.0, axis=1))

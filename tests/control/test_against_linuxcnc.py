@@ -1,4 +1,4 @@
-"""What the model says of the control against what LinuxCNC's planner did: accuracy by the truth plant, and the time.
+"""The model of the controller against LinuxCNC's planner: accuracy by the truth plant, and the time.
 
 The long version records anew: `python -m pytest -m campaign tests/control -s`.
 """

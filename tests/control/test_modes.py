@@ -1,4 +1,4 @@
-"""Path modes as programs and machine files state them, and what a compensation makes of them."""
+"""Path modes as programs and machine files state them, and their effect on a compensation."""
 
 import io
 import json
@@ -176,7 +176,7 @@ def test_long_programs_take_the_same_time_and_go_as_far_off(orthoglide, mode, mo
 
 
 def test_the_control_rests_between_cuts_and_joining_lines(orthoglide):
-    """Mode lines stand around joining lines, and the cut beside them stays within the tolerance."""
+    """Mode lines enclose joining lines, and the cut next to them stays within the tolerance."""
     done = compensated(orthoglide, circle(25.0, 3000), "G64")
     text = done.written.data.decode().splitlines()
     assert [each for each in text if each.startswith("G6")] == ["G64", "G61", "G64", "G61", "G64"]
@@ -246,7 +246,7 @@ def test_long_programs_wait_as_long(monkeypatch, orthoglide):
 
 @pytest.mark.parametrize("mode", ["G61", "G64 P0.01"])
 def test_verify_repeats_what_the_control_makes_of_it(orthoglide, mode):
-    """Its points lie closer than those of the summary and count what is left across the path only."""
+    """Its points lie closer than those of the summary and count the residual across the path only."""
     done = compensated(orthoglide, ["G4 P3", *circle(25.0, 3000)], mode, arcs=False)
     text = program_of(done.written.data, "out.nc", orthoglide.config)
     told, mine = verify(text, done.program, orthoglide).figures(1.0), summary(done, orthoglide)

@@ -43,7 +43,7 @@ def test_where_nothing_is_merged_there_is_no_other_path():
 
 
 def test_forces_beside_stops_are_known_to_what_the_speed_there_leaves_open():
-    """What every millisecond says of the force, a row in twenty does not."""
+    """Rows of every millisecond determine the force; one row in twenty does not."""
     found, program = recorded("squircle-exact")
     track = lay_track(program.path, Job(load_config([shipped("config/router.yaml")])).conditions)
     rests = np.array([mode.exact for mode in program.modes])

@@ -19,7 +19,7 @@ class Workshop:
         self.answer = functools.cache(self._answer)
 
     def _made(self, plan):
-        """(path of the experiment, what the plant made)."""
+        """(path of the experiment, data of the plant)."""
         made = make(plan)
         folder = self.folder / f"experiment-{len(list(self.folder.iterdir()))}"
         return write(made, plan, folder, runner.CONFIG), made

@@ -17,7 +17,7 @@ def judged(folder, seed):
 
 
 def some(seeds, in_ci):
-    """Seeds as parameters whose ids say what they show."""
+    """Seeds as parameters with descriptive ids."""
     told = dict(seeds) if isinstance(seeds, dict) else {seed: f"experiment {k}" for k, seed in enumerate(seeds, 1)}
     return [
         pytest.param(
@@ -48,7 +48,7 @@ def test_a_few_things_that_are_wrong_with_an_arm(tmp_path, seed):
 
 @pytest.mark.campaign
 def test_a_beam_that_broke_at_one_of_28_poses_is_listed(tmp_path):
-    """It was something unknown, and nothing was named."""
+    """An unknown effect acted, and no cause was named."""
     result, row = judged(tmp_path, 53039)
     assert row["honest"] and row["all"] and not row["false_cause"]
     assert result["outliers"] == [{"run": "campaign-1", "row": 26}]

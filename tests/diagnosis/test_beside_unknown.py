@@ -1,4 +1,4 @@
-"""What is named beside something that no library has: all that is certain, and no imitation of it for certain."""
+"""Causes named together with an effect that no library has: all that is certain, and no imitation of it for certain."""
 
 import pytest
 

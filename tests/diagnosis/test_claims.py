@@ -1,4 +1,4 @@
-"""What a diagnosis claims of unseen runs is what its residuals show and what its machine file leaves of them."""
+"""Claims of a diagnosis on unseen runs agree with its residuals and with its machine file."""
 
 import numpy as np
 import pytest

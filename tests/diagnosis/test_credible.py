@@ -1,4 +1,4 @@
-"""What is named instead of something that no library has."""
+"""Causes named in place of an effect that no library has."""
 
 import pytest
 

@@ -13,7 +13,7 @@ SMALL = {"runs": 3, "rows": 250, "paths": ("circles-blended", "zigzag-blended", 
 
 
 def answer(plan, folder, *options):
-    """What the tool says and what the plant knows."""
+    """The answer of the tool and the truth of the plant."""
     made, said = make(plan), folder / "result.json"
     code, text = runner.invoke(["diagnose", str(write(made, plan, folder)), "--json", str(said), *options])
     assert code == 0, text

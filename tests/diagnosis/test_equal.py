@@ -1,4 +1,4 @@
-"""Causes that no log can tell apart: known before the data, reported together, and told apart by the advice that follows."""
+"""Causes that are indistinguishable in every log: known before the data, reported together, and told apart by the advice that follows."""
 
 import shutil
 from dataclasses import replace
@@ -31,7 +31,7 @@ def groups(design):
 
 
 def follow(workshop, plan, tmp_path, candidate):
-    """Does what a candidate says; the result after it."""
+    """Applies a candidate; the result after it."""
     path, made = workshop.made(plan)
     folder = tmp_path / "again"
     shutil.copytree(path.parent, folder)

@@ -1,4 +1,4 @@
-"""Laws that act in one run alone, and what no form can express: found as what it is, or a map that an unseen run confirms."""
+"""Laws that act in one run alone, and effects that no form can express: found as what it is, or a map that an unseen run confirms."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""A machine whose springs and force are all a little off is told as that, not as others that do nearly the same."""
+"""A machine whose springs and force are all a little off is reported as such, not as similar causes."""
 
 import json
 

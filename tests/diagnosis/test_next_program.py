@@ -90,7 +90,7 @@ def test_in_the_air_nothing_is_met_that_the_runs_did_not_pass(bench, every):
 
 
 def test_the_same_in_the_language_of_the_control(opened):
-    """Dwell in seconds, remarks and units as each control has them; the motion is read alike."""
+    """Dwell in seconds, remarks and units as each control has them; the motion is the same."""
     design = MotionDesign(centre=(5.0, -3.0, 2.0), radius=11.0, feed=700.0, plane="YZ", dwell_s=90.0)
     each = replace(candidate(SimpleNamespace(channels=(), end=0.0), design), action="a (remark)")
     said = {

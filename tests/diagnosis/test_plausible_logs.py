@@ -23,7 +23,7 @@ TIP = ("x_mm", "y_mm", "z_mm")
 
 
 def simulated(folder, machine, number, *more_words):
-    """The log of a groove with its workpiece at a place drawn by number; None where the machine does not reach it."""
+    """The log of a groove with its workpiece at a place drawn by number; None out of reach."""
     rng = np.random.default_rng([MACHINES.index(machine), number])
     config = ROOT / "config" / f"{machine}.yaml"
     nominal = yaml.safe_load(config.read_text())

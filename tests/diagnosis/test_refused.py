@@ -1,4 +1,4 @@
-"""Logs of an arm's program that cannot be what they say are refused with what they look like."""
+"""Logs that cannot belong to an arm's program are refused, with their likely mistake."""
 
 import shutil
 

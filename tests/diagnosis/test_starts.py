@@ -1,4 +1,4 @@
-"""Where play and friction stood when a run began nobody knows, however long an axis waits for its first motion."""
+"""The initial state of play and friction is unknown, however long an axis waits for its first motion."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Runs of which nothing but the tip is known: its time along the path is free, and what cannot be seen is not named."""
+"""Runs with measured tips only: its time along the path is free, and what cannot be seen is not named."""
 
 from dataclasses import replace
 

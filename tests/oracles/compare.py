@@ -30,7 +30,7 @@ def moving(run: Run, least: float) -> list[Motion]:
 
 
 def difference(program: Program, run: Run) -> str:
-    """Empty when every motion agrees to the digits printed, else what is different."""
+    """Differences of motions; empty when every motion agrees to the printed digits."""
     path, sites = program.path, program.sites
     local = (path.end - sites.offset) / sites.unit[:, None]
     length = np.where(path.kind == ARC, np.inf, np.linalg.norm(path.end - path.start, axis=1)) / sites.unit

@@ -1,4 +1,4 @@
-"""Shipped machines as plants that share nothing with the model: those of the recorded programs, and three more."""
+"""Shipped machines as plants independent of the model: those of the recorded programs, and three more."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ def held(result, before, after, rows):
 
 @pytest.fixture(scope="module")
 def some(tmp_path_factory):
-    """A program compensated under small spreads, and what a hundred machines make of it."""
+    """A program compensated under small spreads, run on a hundred machines."""
     result = compensated(tmp_path_factory.mktemp("machine"), SMALL)
     return result, *judged(result, SMALL, 100, 5, 1)
 

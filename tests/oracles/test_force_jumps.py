@@ -49,7 +49,7 @@ EDGES = {
 
 
 class Truth:
-    """A random program, its moves, and what the machine does along them."""
+    """A random program, its moves, and the motion of the machine along them."""
 
     def __init__(self, model: str, seed: int, arcs: bool) -> None:
         rng = np.random.default_rng(seed)

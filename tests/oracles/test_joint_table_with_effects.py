@@ -1,4 +1,4 @@
-"""The joint table of machines with effects, played into plants that share nothing with the model, leaves what is claimed."""
+"""The joint table of machines with effects, played into independent plants, leaves the claimed error."""
 
 import json
 

@@ -164,7 +164,7 @@ def said_by(text, ending):
 
 
 def said_by_krl(text):
-    """Poses (n, 6); what a statement does not name stays."""
+    """Poses (n, 6); values that a statement omits stay."""
     held, out = dict.fromkeys("XYZABC", 0.0), []
     for line in text.splitlines():
         if re.match(r"(PTP|LIN) \{", line):

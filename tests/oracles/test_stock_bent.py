@@ -1,4 +1,4 @@
-"""The walls that a bending tool leaves, against a plant that cuts tooth by tooth what stands and knows no directions or arcs.
+"""The walls that a bending tool leaves, against a plant that cuts tooth by tooth, without directions or arcs.
 
 The springs are so soft that the first pass is two tenths of a millimetre off: later passes graze what it left, where the arc
 grows with the square root of what stands, and behind the corner the tool needs some way to come out of its bend.

@@ -1,4 +1,4 @@
-"""What stands under `effects:` in a config is part of the machine that compensate makes up for."""
+"""Entries of `effects:` in a config are part of the compensated machine."""
 
 import numpy as np
 import pytest

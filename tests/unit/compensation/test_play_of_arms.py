@@ -1,4 +1,4 @@
-"""Play in a joint of an arm is made up for where the joint turns round, or said to be left: on a plant with a play of its own."""
+"""Play in a joint of an arm is made up for where the joint turns round, or reported as residual: on a plant with a play of its own."""
 
 import numpy as np
 import pytest

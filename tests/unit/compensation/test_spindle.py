@@ -1,4 +1,4 @@
-"""What the program says of its spindle: M4 turns a side force over, M5 and S0 are warned of where the tool cuts."""
+"""Spindle words of a program: M4 turns a side force over, M5 and S0 are warned of where the tool cuts."""
 
 import io
 

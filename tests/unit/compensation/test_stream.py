@@ -107,7 +107,7 @@ def read(text, *before):
 
 
 def answers(reader, *lines):
-    """For every line the force along x that was read, None for a header, or what was said against it."""
+    """For every line the force along x that was read, None for a header, or its error."""
     out = []
     for line in lines:
         try:

@@ -1,4 +1,4 @@
-"""Sets of causes that rows and stated tolerances do not tell apart are alternatives, whatever is usual of their sizes."""
+"""Sets of causes that rows and stated tolerances cannot separate are alternatives, whatever the priors of their sizes."""
 
 from types import SimpleNamespace
 

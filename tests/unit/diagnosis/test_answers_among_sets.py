@@ -27,7 +27,7 @@ def fitted(evidence, *members):
 
 @pytest.fixture
 def weighed():
-    """A search in which 2 is minor wherever it is, and sets that were not fitted explain nothing."""
+    """A search in which 2 is always minor, and sets that were not fitted have no evidence."""
 
     def search(*done):
         sets = fitted_sets.FittedSets.__new__(fitted_sets.FittedSets)

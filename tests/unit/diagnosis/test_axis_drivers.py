@@ -1,4 +1,4 @@
-"""What the leftover of an axis depends on, where the axis moves and where it stands."""
+"""Covariates of the residual of an axis, in motion and at rest."""
 
 import numpy as np
 import pytest

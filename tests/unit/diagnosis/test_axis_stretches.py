@@ -48,7 +48,7 @@ def test_a_push_that_begins_among_lost_rows_is_not_known_to_better(begin):
 
 
 def stretch(leftover):
-    """What is found where one half second of twenty is as given, and all else noise of 1."""
+    """Findings in half a second of given data within twenty of noise of size 1."""
     left = np.random.default_rng(3).standard_normal(4001)
     left[1001:1101] = leftover
     return intervals([left], [5e-3 * np.arange(4001)], 1.0)[0]

@@ -1,4 +1,4 @@
-"""Friction is against the motion, at rest and at speed."""
+"""Friction acts against the motion, standing and at speed."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A run is judged with what the others would have named: what it alone has decided is no answer to it."""
+"""A run is judged with the causes of the others: what it alone has decided is no answer to it."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -79,7 +79,7 @@ def test_what_shows_in_one_run_alone_is_not_named_by_the_others():
 
 
 def test_what_is_minor_beside_the_answer_is_beside_its_parts_too():
-    """Column 2 shows in all runs and is named by nobody: it is no reason to keep what the others do not ask for."""
+    """Column 2 shows in all runs and is no cause: it is no reason to keep what the others do not ask for."""
     problem, fit = experiment(np.array([0.0, 1.0, 0.4]), np.array([0.4, 0.3, 0.3]), only_last=True)
     for minor in ((), (2,)):
         f = replace(fit((1,)), minor=minor)

@@ -82,7 +82,7 @@ def test_the_sample_asks_for_poses_that_its_arm_reaches(tmp_path):
 
 
 def test_forty_poses_by_design_tell_more_than_most_choices_by_chance():
-    """Poses of campaign A of the UR10, chosen without their tips; judged by what they leave on campaign B."""
+    """Poses of campaign A of the UR10, chosen without their tips; judged by the residual on campaign B."""
     robot, runs = campaigns()
     bench = ArmBench(robot=robot, causes=(), campaigns=runs)
     columns = [c for c in bench.columns() if c.effect in ("link_geometry", "gravity_compliance")]

@@ -28,7 +28,7 @@ def outcomes(names, apart, left, *, knows=()):
 
 @pytest.fixture
 def three():
-    """The first two look alike, the third does not."""
+    """The first two are indistinguishable, the third differs."""
     apart = [[0, 0.5, 90], [0.5, 0, 90], [90, 90, 0]]
     left = [[0, 7e-7, 0.02], [7e-7, 0, 0.02], [0.02, 0.019, 0]]
     return outcomes(["joint_offset (A2)", "chain_error (A2)", "gravity"], apart, left)

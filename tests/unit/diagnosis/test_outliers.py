@@ -1,4 +1,4 @@
-"""Rows that no machine has made are told from the rows beside them."""
+"""Rows that no machine made are found by comparison with their neighbours."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Patterns of what a leftover may depend on: runs need not have logged the same."""
+"""Patterns of the covariates of a residual: runs need not have logged the same."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What the fit of a loop and the written machine file predict between the rows of a log is the same."""
+"""The fit of a loop and the written machine file predict the same between the rows of a log."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What intervals say of springs and forces, and what a cause that acts for a while asks of its rows."""
+"""Intervals of springs and forces, and the rows that a temporary cause needs."""
 
 from types import SimpleNamespace
 
@@ -44,7 +44,7 @@ def test_a_force_is_known_no_better_than_the_spring_that_it_bends():
 
 
 def test_rows_that_tell_force_and_spring_apart_say_it_better():
-    """To what the formula of a whole force is off by."""
+    """Error of the formula of a whole force."""
     assert FORMULA <= deviation_of_force(0.3) < 1.01 * FORMULA < 0.11 * STATED
 
 

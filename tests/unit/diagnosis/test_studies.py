@@ -116,7 +116,7 @@ def test_the_floor_is_what_repeats_show(robot, faulty):
 
 
 def weary(r, amplitude, seed):
-    """The shoulder lift gives way by the square of what it carries: no effect of the library makes it."""
+    """The shoulder lift gives way by the square of its load: no effect of the library makes it."""
     carried = np.cos(r.q[:, 1]) + 0.4 * np.cos(r.q[:, 1] + r.q[:, 2])
     error = np.outer(amplitude * carried * np.abs(carried), np.eye(6)[1])
     return replace(r, tip=measured(r.q, seed, error=error, **TRUTH))
@@ -330,7 +330,7 @@ def test_a_push_of_an_axis_is_named_with_its_time():
 
 
 def test_forces_of_a_withheld_run_are_judged_by_themselves():
-    """What was there before is that of the withheld run, which pushes harder, not that of the others."""
+    """The gap before is that of the withheld run, which pushes harder, not of the others."""
     whole, other = axis_log(), axis_log(seed=1)
     nothing = np.full(len(whole.time), np.nan)
     seen = replace(whole, name="a", setpoint=nothing)

@@ -1,4 +1,4 @@
-"""From which size on something beside a set of causes is an effect that the library lacks."""
+"""The size from which a residual beyond a set of causes is an effect that the library lacks."""
 
 from types import SimpleNamespace
 

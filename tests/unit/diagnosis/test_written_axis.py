@@ -1,4 +1,4 @@
-"""What the written machine file leaves of an unseen run of a joint is what the diagnosis claims, sizes of every axis included."""
+"""The residual of an unseen run with the written machine file is the claimed one, sizes of every axis included."""
 
 import numpy as np
 import pytest

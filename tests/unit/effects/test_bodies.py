@@ -1,4 +1,4 @@
-"""Inertia, growing links, a soft base and a limit of speed, against plants that share nothing with the model."""
+"""Inertia, growing links, a soft base and a limit of speed, against plants independent of the model."""
 
 import csv
 import json

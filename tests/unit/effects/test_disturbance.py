@@ -18,7 +18,7 @@ EFFECT = shelf.load("effects", "disturbance")
 
 
 def standing(n=401):
-    """One actuator at rest for 4 s from 100 s of the common clock on."""
+    """One standing actuator for 4 s from 100 s of the common clock on."""
     t = np.linspace(0.0, 4.0, n)
     zero = np.zeros((n, 1))
     return Motion(

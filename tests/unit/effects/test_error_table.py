@@ -30,7 +30,7 @@ def test_one_column_serves_both_ways_in_any_unit(unit, size):
 
 @pytest.mark.parametrize("comp_type", [0, 1])
 def test_a_screw_file_is_read_as_linuxcnc_reads_it(comp_type):
-    """Type 0 states where the axis is, type 1 what is added to the command: it goes the other way."""
+    """Type 0 states the position of the axis, type 1 the addition to the command: it goes the other way."""
     table = parse_comp(COMP, "x.comp", comp_type)
     want = [0.098742 - 0.1, 0.051632 - 0.1] if comp_type == 0 else [-0.098742, -0.051632]
     assert table.at(np.array([0.1, 0.1]), np.array([1.0, -1.0])) == pytest.approx(want)

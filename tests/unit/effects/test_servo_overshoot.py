@@ -88,7 +88,7 @@ def test_with_a_lag_it_is_the_plain_loop_of_second_order_and_with_much_damping_t
 
 
 def test_a_circle_comes_out_smaller_by_what_the_loop_swings_out(tmp_path):
-    """At 50 mm/s round 10 mm a loop of 80 ms swings 40 um out; a filter that knows nothing of ours follows the program."""
+    """At 50 mm/s round 10 mm a loop of 80 ms swings 40 um out; an independent filter follows the program."""
     (tmp_path / "in.nc").write_text("G21 G90 G17 G94\nG0 X10 Y0 Z0\nG3 X10 Y0 I-10 J0 F3000\nM2\n")
     more = "effects: [{effect: servo_overshoot, period_ms: 80, damping: 0.7}]\nprocess: {force: {model: none}}\n"
     (tmp_path / "more.yaml").write_text(more)

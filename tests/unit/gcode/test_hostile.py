@@ -1,4 +1,4 @@
-"""Inputs that nobody writes and that reach the reader all the same: deep, long, and repetitive ones. None may take long."""
+"""Damaged inputs that reach the reader: deep, long, and repetitive ones. None may take long."""
 
 import time
 

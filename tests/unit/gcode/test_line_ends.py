@@ -18,7 +18,7 @@ LINES = ["G21 G90 G17", "G0 X0 Y0 Z5", "G1 Z-1 F100", "G3 X10 Y0 I5 J0 F300", "G
 
 
 def cut(data):
-    """(line, end of line), by a reading that shares nothing with Text: CRs belong to the LF behind them, three at most."""
+    """(line, end of line), by a reading independent of Text: CRs belong to the LF behind them, three at most."""
     out, line, k = [], b"", 0
     while k < len(data):
         end = next((each.encode() for each in sorted(ENDS, key=len)[::-1] if data.startswith(each.encode(), k)), b"")

@@ -1,4 +1,4 @@
-"""Where a control stands still for something in front of a motion; what it does is recorded in tests/validation/recordings/inches_and_cycles."""
+"""Where a control stands still for something in front of a motion; recorded in tests/validation/recordings/inches_and_cycles."""
 
 import numpy as np
 import pytest

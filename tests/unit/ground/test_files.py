@@ -226,7 +226,7 @@ def test_a_pipe_is_read_once_and_gives_the_same_again(tmp_path):
 
 @pytest.fixture(params=[True, False], ids=["nameless", "beside"])
 def nameless(request, monkeypatch):
-    """Both ways to make a file that nobody sees before it is whole."""
+    """Both ways to make a file that is invisible until it is whole."""
     if not request.param:
         monkeypatch.delattr(os, "O_TMPFILE", raising=False)
     return request.param

@@ -1,4 +1,4 @@
-"""What is written for controls, evaluated by the controls' own formulas against errors in closed form."""
+"""Tables for controls, evaluated by the controls' own formulas against errors in closed form."""
 
 import math
 import re

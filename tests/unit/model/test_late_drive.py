@@ -1,4 +1,4 @@
-"""A drive that is late, where its recording begins in motion and goes on after rows that nobody logged."""
+"""A drive that is late, where its recording begins in motion and goes on after rows that are missing."""
 
 import numpy as np
 import pytest

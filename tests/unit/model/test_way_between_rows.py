@@ -1,4 +1,4 @@
-"""Between the rows of a log its way is smooth; where rows are missing it does not turn round, as nobody saw it do so."""
+"""Between the rows of a log its way is smooth; where rows are missing it has no reversal."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Tables of arms against the textbook's matrices, which share nothing with the plug-in's quaternions."""
+"""Tables of arms against the textbook's matrices, independent of the plug-in's quaternions."""
 
 from pathlib import Path
 

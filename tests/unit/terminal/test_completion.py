@@ -27,7 +27,7 @@ CASES = [
 
 
 def asked(shell, words):
-    """Variables by which a shell asks what it may offer."""
+    """Variables by which a shell asks for completions."""
     whole = ["camcomp", *words]
     found = {"COMP_WORDS": " ".join(whole), "COMP_CWORD": str(len(words)), "_CAMCOMP_COMPLETE": f"{shell}_complete"}
     if shell == "fish":

@@ -1,4 +1,4 @@
-"""The page beside the sample pocket prints what it says."""
+"""Commands of the page of the sample pocket print the lines that it shows."""
 
 import shutil
 

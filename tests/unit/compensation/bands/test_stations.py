@@ -35,7 +35,7 @@ def test_the_first_and_the_last_row_are_stations(rows):
 
 
 def test_what_turns_small_beside_a_large_force_is_seen_too():
-    """A force that is known to be zero says nothing of the machines on which it is not."""
+    """A force that is zero does not determine the band of machines with another force."""
     change = 30.0 * circle(400)
     found = Stations.along(0.1 * circle(400), [np.zeros((400, 3)), change])
     assert np.linalg.norm(found.spread(change[found.rows]) - change, axis=1).max() < 0.001 * 30.0

@@ -1,4 +1,4 @@
-"""What a run imports once everything is compiled: not what numba needs for compiling only."""
+"""Imports of a run once everything is compiled: not what numba needs for compiling only."""
 
 import subprocess
 import sys

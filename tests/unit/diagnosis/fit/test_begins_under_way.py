@@ -1,4 +1,4 @@
-"""Of an actuator that is on its way when a log begins nobody knows where its carriage begins to follow."""
+"""The state of the play is unknown for an actuator that moves when a log begins."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""When something acted, from a leftover whose noise seems to remember it."""
+"""The interval of a temporary effect, from a residual with correlated noise."""
 
 from types import SimpleNamespace
 
@@ -15,7 +15,7 @@ CANDIDATE = SimpleNamespace(
 
 
 def filtered(values, memory, gain):
-    """What rows show beyond what the rows before foretell."""
+    """Rows minus their prediction from earlier rows."""
     expected, out = 0.0, []
     for value in values:
         out.append(value - expected)

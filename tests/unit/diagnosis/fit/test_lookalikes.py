@@ -9,7 +9,7 @@ from camcomp.diagnosis.fit import lookalikes
 
 
 def slope_on(*levels):
-    """A bench, a slope, and what it does to the tip of each run: levels (n,) of the tool in um of shift."""
+    """A bench, a slope, and its effect on the tip of each run: levels (n,) of the tool in um of shift."""
     columns = [np.column_stack([np.zeros((len(each), 2)), np.asarray(each, float)[:, None]]) for each in levels]
     run = SimpleNamespace(measured=SimpleNamespace(has=lambda kind: kind == "tip"))
     candidate = SimpleNamespace(effect=SimpleNamespace(TARGET="named"), shapes=(), switches=())

@@ -1,4 +1,4 @@
-"""A loop that nobody saw speed up may swing: what its encoder says in the first rows is that, and nothing of the loop.
+"""A loop may swing where its start is not in the log: what its encoder says in the first rows is that, and nothing of the loop.
 
 Truth: the loop's differential equation, integrated from rest; the log has it from its first step on, as if it had been moving.
 """
@@ -15,7 +15,7 @@ SPEED, PERIOD_S, DAMPING = 5.0, 0.083, 0.2
 
 @pytest.fixture(scope="module")
 def swung():
-    """Rows, set-points and what the loop stands from them; it speeds up within 3 ms of the first row."""
+    """Rows, set-points and the lag of the loop; it speeds up within 3 ms of the first row."""
     w = 2 * np.pi / PERIOD_S
     push = lambda t: SPEED / 0.003 * (t < 0.003)
     found = solve_ivp(

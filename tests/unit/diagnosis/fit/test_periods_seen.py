@@ -1,4 +1,4 @@
-"""What is driven less often than one and a half times over a pitch is no evidence of a screw."""
+"""Travel below one and a half pitches is no evidence of a screw."""
 
 from types import SimpleNamespace
 

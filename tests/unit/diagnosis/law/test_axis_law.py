@@ -1,4 +1,4 @@
-"""What is left of an axis becomes a formula: each way of its own, in the drive force and in the following error."""
+"""The residual of an axis becomes a formula: each way of its own, in the drive force and in the following error."""
 
 import re
 

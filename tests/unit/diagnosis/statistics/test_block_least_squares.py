@@ -1,4 +1,4 @@
-"""What a block that is left out may still know of itself."""
+"""The information about a left-out block that remains in the others."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_what_two_columns_do_that_differ_in_one_block_only_is_left_open_there():
 
 @pytest.mark.parametrize(("telling", "foretold"), [(None, False), (1, True)])
 def test_runs_in_which_an_axis_stands_foretell_nothing_of_the_one_in_which_it_moves(telling, foretold):
-    """Of four runs whole ones are left out; where one of them tells alone, its own stretches do."""
+    """Whole runs of four are the folds; a single informative run is split into stretches."""
     rng = np.random.default_rng(2)
     times = [np.linspace(0.0, 10.0, 1000)] * 4
     columns = [np.zeros(1000)] * 3 + [np.sin(np.linspace(0.0, 60.0, 1000))]

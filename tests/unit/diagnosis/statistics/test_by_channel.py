@@ -1,4 +1,4 @@
-"""A matrix by channels multiplies and is picked from as the array of the same values; what is zero takes no place."""
+"""A matrix by channels multiplies and is picked from as the array of the same values; zeros take no memory."""
 
 import numpy as np
 import pytest

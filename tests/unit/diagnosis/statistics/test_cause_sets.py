@@ -38,7 +38,7 @@ def best_of(scale):
 
 @pytest.mark.parametrize("size", [0, 1, 2, 3])
 def test_sets_of_one_size_share_the_prior_of_that_size(size):
-    """Of n alike candidates, d drawn one after the other: every set comes in d! orders."""
+    """Of n indistinguishable candidates, d drawn one after the other: every set comes in d! orders."""
     one = np.exp(candidates(400).prior(tuple(range(size))))
     assert comb(400, size) * one == pytest.approx(SIZES[size], rel=0.01)
 
@@ -85,7 +85,7 @@ def test_one_effect_at_three_targets_is_likelier_than_three_effects_and_at_two_i
 
 
 def test_what_has_one_origin_is_of_one_size():
-    """Rows that two columns explain alike: one at the size of its mates, or its twin at eight times that."""
+    """Rows that two columns explain equally well: one at the size of its mates, or its twin at eight times that."""
     rng = np.random.default_rng(7)
     D = rng.standard_normal((400, 8))
     D[:, 3] = D[:, 2] / 8.0
@@ -114,7 +114,7 @@ def test_twins_have_equal_parts_of_their_probability_whatever_their_priors():
 
 
 def test_sets_of_another_kind_break_no_tie():
-    """That one of two twins is in more of the far less probable sets says nothing of which of them is there."""
+    """Membership in many improbable sets does not make one of two indistinguishable candidates more probable."""
     fits = [fitted(0, 1), fitted(0, 2), fitted(1, 3)]
     inclusion = judge(fits, np.array([0.60, 0.35, 0.05]), [((0, 1), (0, 2))]).inclusion
     assert inclusion[1] == pytest.approx(0.5)
@@ -128,7 +128,7 @@ def test_a_set_far_less_probable_is_a_rival_only_where_nothing_tells_it_apart():
 
 
 def test_a_minor_one_makes_no_set_likelier_before_the_data():
-    """All targets of an effect are one thing that happens; two of them and a minor third, which nobody names, are three."""
+    """All targets of an effect are one thing that happens; two of them and a minor third are three."""
     kinds = CausePrior(*(getattr(candidates(8), name) for name in ("columns", "weight", "exclusive")), ((0, 1, 2),))
     assert kinds.prior((0, 1, 2)) > kinds.prior((0, 1))
     beside = kinds.value(replace(fitted(0, 1), minor=(2,)))

@@ -1,4 +1,4 @@
-"""Evidence in closed form against the integral itself, and what it has to prefer."""
+"""Evidence in closed form against the integral itself, and its preferences."""
 
 from dataclasses import replace
 
@@ -94,7 +94,7 @@ def test_the_right_cause_wins_and_its_estimate_covers_the_truth():
 
 
 def strained(reach):
-    """Two columns much alike, both far beyond their tolerances, a third that is not, and a small one."""
+    """Two similar columns, both far beyond their tolerances, a third that differs, and a small one."""
     rng = np.random.default_rng(3)
     D = rng.standard_normal((200, 4)) @ np.array([[1, 0.9, 0, 0], [0, 0.4, 0, 0], [0, 0, 1, 0.5], [0, 0, 0, 1]])
     r = D @ np.array([1.5, -1.2, 0.8, 0.02]) + rng.standard_normal(200)

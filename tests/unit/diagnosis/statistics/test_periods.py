@@ -10,7 +10,7 @@ NAMES = ("x", "y", "z")
 
 
 def run(seed, drives=None, gap=None, feed=10.0, noise=0.001):
-    """A circle of 25 mm at `feed` mm/s with white noise, and what is added to the carriages or to the tip."""
+    """A circle of 25 mm at `feed` mm/s with white noise, and an addition to the carriages or to the tip."""
     rng = np.random.default_rng(seed)
     t = np.linspace(0.0, 2 * np.pi * 25.0 / feed, 400)
     angle = feed * t / 25.0

@@ -8,7 +8,7 @@ from camcomp.diagnosis.statistics.shrinkage import shrinkage
 
 
 def runs(*ratios, rows=100):
-    """Squared gaps of runs of which these shares of the rms are left."""
+    """Squared gaps of runs of which these shares of the rms remain."""
     return [np.ones(rows) for _ in ratios], [np.full(rows, each**2) for each in ratios]
 
 

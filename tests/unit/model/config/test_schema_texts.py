@@ -1,4 +1,4 @@
-"""Every key of the YAML files says in the schema what it means, with its unit, default and an example that is allowed."""
+"""Every key of the YAML files has its meaning, unit, default and an allowed example in the schema."""
 
 import functools
 import re

@@ -1,4 +1,4 @@
-"""What a machine file may say: one accepted machine, and one mistake at a time in it."""
+"""Admissible machine files: one accepted machine, and one mistake at a time in it."""
 
 from math import pi, radians
 
@@ -227,7 +227,7 @@ def test_plug_in_parameters_are_completed(tmp_path):
 
 @pytest.mark.parametrize(("machine", "first", "second"), [("router", "x", "y"), ("kuka-kr210", "A1", "A2")])
 def test_a_name_that_is_there_twice_is_told_at_the_second(tmp_path, machine, first, second):
-    """In chains and in rows of a robot plug-in alike."""
+    """In chains as in rows of a robot plug-in."""
     text = (ROOT / f"config/{machine}.yaml").read_text()
     number, line = next((i, line) for i, line in enumerate(text.splitlines(), 1) if f"name: {second}," in line)
     (error,) = refused(tmp_path, text.replace(f"name: {second},", f"name: {first},"))

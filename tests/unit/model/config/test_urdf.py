@@ -156,7 +156,7 @@ def test_a_joint_that_follows_one_outside_the_chain_stands_at_its_offset():
 
 
 def test_the_chain_begins_at_the_base_that_is_named(tmp_path):
-    """The rail of joint pan is left out: the arm behind it stands on link l0."""
+    """The rail of joint pan is ignored: the arm behind it stands on link l0."""
     seven = [("x", "prismatic", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1, 0, 0)), *JOINTS]
     whole = read_urdf(urdf(seven), "arm.urdf")
     arm = read_urdf(urdf(seven), "arm.urdf", base="l0")

@@ -1,4 +1,4 @@
-"""What the force on a tool does that a feed hold stops in its cut nobody knows: its edges rub, and no chip says which way."""
+"""The force on a tool that a feed hold stops in its cut is not determined: its edges rub, and no chip says which way."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a twin has worked out before belongs to that machine: the next one on the same run path works out its own."""
+"""Cached results of a twin belong to its machine: the next one on the same run path works out its own."""
 
 from dataclasses import replace
 from gc import collect
@@ -109,14 +109,14 @@ def test_instants_about_the_rows_are_enough_where_drives_have_no_memory(job, nam
 
 
 def test_drives_with_a_memory_see_the_whole_run(job):
-    """Where play turned round between two rows decides what it does long after."""
+    """The place of a reversal between two rows decides the later state of the play."""
     one, run_path = [cause("screw_pitch", error_ppm=300.0), cause("backlash", width_mm=20.0)], a_run(job)
     rows_apart = replace(run_path, time=run_path.time[::9], row_rho=run_path.row_rho[::9])
     assert np.array_equal(read(twin_of(job), run_path, one)[::9], read(twin_of(job), rows_apart, one))
 
 
 def test_slopes_are_not_taken_for_others_that_are_gone(job):
-    """An id tells objects apart only while they live; the next one may get the same."""
+    """An id separates objects only while they live; the next one may get the same."""
     twin, run_path = twin_of(job), a_run(job)
     _, solved = twin.sense(run_path)
     known, moved = twin.slopes(run_path, (), solved), run_path.row_rho + 0.01

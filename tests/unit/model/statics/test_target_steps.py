@@ -12,7 +12,7 @@ AIM = np.array([[1.0, 2.0, -3.0], [0.0, 0.5, 4.0]])
 
 @pytest.mark.parametrize("gain", [1.0, 1.5, 3.0, 6.0])
 def test_steps_are_halved_until_the_iteration_converges(gain, monkeypatch):
-    """A machine whose tip goes `gain` times as far as it is told: whole steps converge for a gain below 2 alone."""
+    """A machine whose tip goes `gain` times as far as commanded: whole steps converge for a gain below 2 alone."""
 
     def solve(machine, mode, commanded, **_):
         tip = gain * np.asarray(commanded)

@@ -212,7 +212,7 @@ TIPS = [("flat", {}), ("ball", {}), ("bull", {"corner_mm": 1.5}), ("drill", {})]
 @pytest.mark.parametrize("slope", [0.0, 0.05, -0.05])
 @pytest.mark.parametrize(("kind", "more"), TIPS)
 def test_a_move_in_parts_meets_what_it_meets_whole(kind, more, slope):
-    """Beside a groove, where one side of the tool is free."""
+    """Next to a groove, where one side of the tool is free."""
     begin = [("line", (30, 0, -2)), ("line", (30, 0.7, -2))]
     whole = path_of(*begin, ("line", (20, 0.7, -2 + 10 * slope)), start=(-30, 0, -2))
     parts = [("line", (30 - x, 0.7, -2 + x * slope)) for x in np.linspace(0, 10, 51)[1:]]

@@ -1,4 +1,4 @@
-"""What a user can do wrong with a stock, and what is said where it contradicts something else."""
+"""Mistakes with a stock, and warnings where it contradicts other keys."""
 
 import numpy as np
 import pytest
@@ -75,7 +75,7 @@ def test_what_is_wrong_with_a_file_is_said(run, tmp_path, content, said):
 
 @pytest.mark.parametrize(("missing", "said"), [(0, None), (2, "4 edges have a triangle on one side only, as at -30 ")])
 def test_a_body_with_a_hole_is_refused(run, tmp_path, missing, said):
-    """What stands under a hole nobody knows."""
+    """Material under a hole is undetermined."""
     trimesh = pytest.importorskip("trimesh", reason="it makes the file")
     box = trimesh.creation.box(bounds=[[-30, -30, -9], [30, 30, 0]])
     up = np.argsort(-box.face_normals[:, 2], kind="stable")

@@ -56,7 +56,7 @@ def test_a_hole_of_a_cycle_is_missing_where_a_slot_crosses_it_and_is_drilled_wit
 
 
 def test_a_cycle_that_goes_on_in_layers_comes_back_into_its_own_hole(job):
-    """G83 retracts and returns at rapid; a second hole beside it overlaps the first."""
+    """G83 retracts and returns at rapid; a second hole next to it overlaps the first."""
     path, engaged, _ = followed(job, HEAD + "T1 M6\nG0 X0 Y0 Z5\nG83 X0 Y0 Z-9 R1 Q1 F200\nX2\nX0\nG80\n")
     assert not engaged.turn.any() and len(path) > 30
 

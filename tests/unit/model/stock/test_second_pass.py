@@ -1,4 +1,4 @@
-"""A program that is run twice in one file cuts nothing the second time: its bytes stay, and no force acts."""
+"""A program that is run twice in one file cuts air the second time: its bytes stay, and no force acts."""
 
 import pytest
 
