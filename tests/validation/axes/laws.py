@@ -1,4 +1,4 @@
-"""What the contract's effects can say of encoders and drive forces, and what a fit of them leaves. Nothing of the plant."""
+"""Columns of the contract's effects on encoders and drive forces, and the residual of their fit. Nothing of the plant."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class Driven:
         return unmodelled.Most(max(np.abs(c).max() for c in some), max(np.abs(v).max() for v in speeds), change)
 
     def run(self, axis: Axis | None = None, push: bool = True, fault: bool = True) -> list[Moved | None]:
-        """What it does in every run; with another axis in its place, without its push or its fault."""
+        """Its motion in every run; with another axis in its place, without its disturbance or its fault."""
         out, top = [], self.most
         for number, command in enumerate(self.commands):
             if command is None:
@@ -353,7 +353,7 @@ def small(scene: Scene, taken: set, rng: np.random.Generator) -> list[dict]:
 
 
 def bare(entry: dict, one: Driven) -> list[Moved | None]:
-    """What the axis does without that cause."""
+    """The motion of the axis without that cause."""
     axis = one.axis
     if entry["effect"] == "friction":
         return one.run(axis.but(coulomb=0.0, viscous=0.0, asymmetry=0.0))
@@ -365,7 +365,7 @@ def bare(entry: dict, one: Driven) -> list[Moved | None]:
 
 
 def weigh(entries: list[dict], scene: Scene, moved: dict[str, list]) -> None:
-    """Fills in what every cause does in the channel that shows it best."""
+    """Fills in the effect of every cause on the channel that shows it best."""
     for entry in entries:
         channel = "force" if entry["effect"] in ("friction", "disturbance") else "encoder"
         ratio = 0.0
@@ -446,7 +446,7 @@ def put_fault(name: str, scene: Scene, rng: np.random.Generator) -> dict:
 
 
 def rests(one: Driven, scene: Scene, moved: list[Moved | None]) -> dict[str, float]:
-    """What a fit of everything that the library has leaves of an axis, over the noise, by channel; mass is no error."""
+    """Residual of an axis after a fit of the whole library, over the noise, by channel; mass is no error."""
     some = [(c, m) for c, m in zip(one.commands, moved, strict=True) if c is not None]
     rows = scene.indices(one)
     share = np.sqrt(sum(map(len, rows)) / sum(map(len, scene.rows)))
@@ -463,7 +463,7 @@ def rests(one: Driven, scene: Scene, moved: list[Moved | None]) -> dict[str, flo
 
 
 def honest(entries: list[dict], scene: Scene, moved: dict[str, list]) -> dict:
-    """Which sets of control effects explain each axis, and what the causes of the library leave of the clean signals."""
+    """Sets of control effects that explain each axis, and the residual of clean signals after the library's causes."""
     out: dict = {"axes": {}, "worst": 0.0, "worst_from_rows": 0.0}
     for one in scene.axes:
         if one.fault:

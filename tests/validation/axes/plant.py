@@ -51,7 +51,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Around:
-    """What acts on an axis in a run as a function of time; arrays per millisecond, or nothing."""
+    """Forces and faults on an axis in a run over time; arrays per millisecond, or None."""
 
     load: Array | None = None  # N, pushes the carriage along plus
     rub: Array | None = None  # factor on the friction
@@ -61,7 +61,7 @@ class Around:
 
 @dataclass(frozen=True)
 class Moved:
-    """What an axis did, per millisecond."""
+    """Motion of an axis, per millisecond."""
 
     motor: Array
     force: Array  # of the motor, along plus

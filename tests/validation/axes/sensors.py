@@ -1,4 +1,4 @@
-"""What a controller's log makes of an axis: rows, noise, resolution, and everything that goes wrong with files."""
+"""The log of an axis by its controller: rows, noise, resolution, and everything that goes wrong with files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which effect of the library is tried on which shipped machine, how large, and what an answer has to say.
+"""Effects of the library by shipped machine, with sizes and the right answers.
 
 Sizes move the tip by 15 to 30 um (rms over the rows of all runs), 5 to 10 times the noise of one axis, except where the
 machine is so stiff that even the largest sensible size moves it less (by 6 um and more).
@@ -122,7 +122,7 @@ def faults(machine: str) -> Iterator[Fault]:
 
 
 def wrong(result: dict[str, Any], fault: Fault | None) -> list[str]:
-    """What an answer has wrong; nothing where it is right.
+    """Faults of an answer; empty if it is right.
 
     Right: the cause is first or one of the alternatives, nothing else stands beside it at p above 0.5, its intervals hold
     what is true.  Where runs do not tell it from something else the other one may be named, but not as if it were sure.
@@ -151,7 +151,7 @@ def wrong(result: dict[str, Any], fault: Fault | None) -> list[str]:
 
 
 def answer(folder: Path, machine: str, fault: Fault | None, seed: int = 7) -> tuple[str, list[str]]:
-    """The verdict on that fault, and what the answer has wrong."""
+    """The verdict on that fault, and the faults of the answer."""
     # what to measure next takes two thirds of the time, and has tests of its own
     with patch("camcomp.diagnosis.diagnose._next", lambda *_: None):
         result = runner.ask(experiment(folder, machine, fault, seed))

@@ -29,7 +29,7 @@ def main():
 @click.option("--out", type=click.Path(path_type=Path), required=True)
 @click.option("--truth", type=click.Path(path_type=Path), help="Where the answer goes; default OUT.truth.json.")
 def one(effects, sizes, design, channels, samples, seed, out, truth):
-    """Write one experiment; the truth goes beside the folder, not into it."""
+    """Write one experiment; the truth goes next to the folder."""
     causes = []
     for i, text in enumerate(effects):
         name, _, target = text.partition(":")
@@ -46,7 +46,7 @@ def one(effects, sizes, design, channels, samples, seed, out, truth):
 @main.command("samples")
 @click.option("--out", type=click.Path(path_type=Path), default=runner.ROOT / "samples" / "diagnosis")
 def samples_(out):
-    """Write the shipped sample experiments anew and tell what is true of them."""
+    """Write the shipped sample experiments anew and print their truth."""
     click.echo(json.dumps(samples.make_all(out), indent=1))
 
 

@@ -59,7 +59,7 @@ def _members() -> list[tuple[str, list[Truth]]]:
 
 @lru_cache(maxsize=64)
 def _library(world: int, design: str, channels: str) -> tuple[list[tuple[str, np.ndarray]], list]:
-    """(effect, its columns (rows, k)) of every library cause that shows, and what is needed to simulate more."""
+    """(effect, its columns (rows, k)) of every library cause that shows, and the inputs of further simulations."""
     plan = Plan(seed=world, design=design, channels=channels, world=world)
     _, runs = executed(plan)
     times = [even(r, COUNT) for r in runs]
@@ -74,7 +74,7 @@ def _library(world: int, design: str, channels: str) -> tuple[list[tuple[str, np
 
 
 def left(cause: Cause, plan: Plan, without: tuple[str, ...], picks: int = 3) -> float:
-    """Share (0..1, amplitude) of an effect that is left when up to `picks` other causes imitate it."""
+    """Share (0..1, amplitude) of an effect that remains when up to `picks` other causes imitate it."""
     assert plan.world is not None
     groups, (runs, times, clean, base) = _library(plan.world, plan.design, plan.channels)
     truth, _ = cause.put(Truth(), cause.sign() * cause.unit(), middle(runs))

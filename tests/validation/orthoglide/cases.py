@@ -1,4 +1,4 @@
-"""Which experiments the campaign makes, and what is asked of the answer."""
+"""Experiments of the campaign, and the demands on the answer."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ PLANS = {
 
 
 def make_all(folder: Path) -> dict[str, dict]:
-    """Writes the three folders and returns what is true of each."""
+    """Writes the three folders and returns the truth of each."""
     truths = {}
     for name, plan in PLANS.items():
         made = make(plan)

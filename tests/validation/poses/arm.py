@@ -54,7 +54,7 @@ def turn_vector(vectors: np.ndarray) -> np.ndarray:
 
 @dataclass
 class Off:
-    """What is off in an arm, in the contract's parameters. Arrays go by joint; zero or, for factors, one: nothing."""
+    """Errors of an arm, in the contract's parameters. Arrays go by joint; zero or, for factors, one: nothing."""
 
     offset: np.ndarray
     pitch: np.ndarray  # share

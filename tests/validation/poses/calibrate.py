@@ -46,7 +46,7 @@ def answered(rows: Path, count: int, minutes: float | None = None) -> Iterator[d
 
 
 def calibrate(file: Path) -> dict:
-    """The maps of causes with nothing unmodelled, and beside something unmodelled, with the seeds they were fitted on."""
+    """The maps of causes without and with an unmodelled effect, with the seeds they were fitted on."""
     rows = {row["name"]: row for row in _read(file) if "failed" not in row}
     misses = [m for row in rows.values() for m in row.get("misses", ()) if m < SHAPES]
     out = {}

@@ -166,7 +166,7 @@ class Local:
 
     @cached_property
     def frames(self) -> np.ndarray:
-        """Orthonormal columns (3 n, k) of what the trackers' and targets' places take up, clamping by clamping."""
+        """Orthonormal columns (3 n, k) of the positions of trackers and targets, clamping by clamping."""
         columns = []
         for k in np.unique(self.plant.clamping):
             here = (self.plant.clamping == k).astype(float)
@@ -189,7 +189,7 @@ class Local:
         return self.plant.tips(item.put(self.off, amount), odd) - self.base
 
     def group(self, effect: str, target: str | None, waves: int = HARMONICS) -> np.ndarray:
-        """Columns (3 n, k) of what an effect can do, in mm per unit of its parameters (rad for angles)."""
+        """Columns (3 n, k) of an effect, in mm per unit of its parameters (rad for angles)."""
         plant, out = self.plant, []
         j = plant.arm.names.index(target) if target in plant.arm.names else 0
         share, q = self.shares[j] if target else self.shares.sum(0), plant.q[:, j]
@@ -251,7 +251,7 @@ def _heavier(off: Off) -> Off:
 
 
 def remains(span: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """What a least-squares fit of the span leaves of a change (n, 3) that is free of frames."""
+    """Residual of a change (n, 3), free of frames, after a least-squares fit of the span."""
     fit, *_ = np.linalg.lstsq(span, change.ravel(), rcond=1e-5)
     return (change.ravel() - span @ fit).reshape(change.shape)
 
@@ -403,7 +403,7 @@ def by_another_name(local: Local, change: np.ndarray) -> list[Key]:
 
 
 def alike(local: Local, causes: list[Key], change: np.ndarray, sigma_mm: float) -> list[list[Key]]:
-    """Sets of causes that do what `causes` do (change (n, 3)) within the noise, beside small errors of every kind."""
+    """Sets of causes that do what `causes` do (change (n, 3)) within the noise, together with small errors of every kind."""
     keys = local.groups()
     whole = {key: local.group(*key) / sigma_mm for key in keys}
     blocks = {key: local.free(b) for key, b in whole.items()}

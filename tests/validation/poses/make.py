@@ -1,4 +1,4 @@
-"""Draws an experiment from a seed, lets a laser tracker measure it, and writes it beside its sealed answer."""
+"""Draws an experiment from a seed, lets a laser tracker measure it, and writes it with its sealed answer."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ STAMP = 0.45  # of the noise: what all small errors may come to
 
 
 def draw_plant(arm: Arm, kind: str, rng: np.random.Generator) -> tuple[Plant, dict]:
-    """Campaigns, where tracker and target stood in each, and what is said of that."""
+    """Campaigns with the positions of tracker and target in each, and their labels."""
     campaigns = int(rng.choice([1, 2, 2, 3]))
     clampings = list(range(campaigns))
     if campaigns == 3 and rng.random() < 0.3:
@@ -80,7 +80,7 @@ def entry(item: Item, amount: float) -> dict:
 
 
 def sized(local: Local, item: Item, want_um: float, sign: float) -> tuple[float, np.ndarray]:
-    """Amount at which an effect alone moves the target by want_um beside the frames, and its whole move."""
+    """Amount at which an effect alone moves the target by want_um apart from the frames, and its whole move."""
     amount = item.unit * sign
     for _ in range(8):
         change = local.of(item, amount)
@@ -174,7 +174,7 @@ def draw_odd(plant: Plant, local: Local, noise_um: float, seed: int, rng) -> tup
 
 
 def measured(plant: Plant, local: Local, tips: np.ndarray, s: dict, rng) -> tuple[np.ndarray, np.ndarray]:
-    """What the trackers see (n, 3) of targets, and the deviation (n,) of each row."""
+    """Readings (n, 3) of targets by the trackers, and the deviation (n,) of each row."""
     n = len(tips)
     sigma = np.full(n, s["white_mm"])
     if s["noise"] == "range":
@@ -203,7 +203,7 @@ def measured(plant: Plant, local: Local, tips: np.ndarray, s: dict, rng) -> tupl
 
 
 def write_log(path: Path, columns: dict[str, tuple[np.ndarray, str]], empty: np.ndarray) -> None:
-    """A CSV; what `empty` (rows, columns) says is left out."""
+    """A CSV; cells of `empty` (rows, columns) are omitted."""
     rows = [",".join(columns)]
     for k in range(len(empty)):
         cells = [format(values[k], how) for values, how in columns.values()]

@@ -1,4 +1,4 @@
-"""The plant of arms against what is known of it, and the experiments that come out of it."""
+"""The plant of arms against known results, and its experiments."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_a_real_arm_stands_a_millimetre_from_its_table(series):
 
 
 def best_frame(stand, seen: np.ndarray, seat: np.ndarray | None = None) -> np.ndarray:
-    """What is left (n, 3) of measured points with the frame of the tracker and the place of the target fitted."""
+    """Residual (n, 3) of measured points after a fit of the tracker's frame and the target's position."""
     seat = np.zeros(3) if seat is None else seat
     for _ in range(10):
         tip = stand.point + stand.turn @ seat
