@@ -25,8 +25,12 @@ def skew_command(job: Job, control: str) -> str:
         raise ConfigError(
             "CC205", "the effects state no squareness", hint="effects: [{effect: squareness, target: xy, ...}]"
         )
-    if control == "marlin":
-        return "M852 " + " ".join(f"{letter}{factors[p]:.7f}" for letter, p in zip("IJK", factors, strict=True)) + "\n"
+    if control == "marlin":  # it reads the factors as lengths: in G20 they would be 25.4 times as large
+        return (
+            "G21\nM852 "
+            + " ".join(f"{letter}{factors[p]:.7f}" for letter, p in zip("IJK", factors, strict=True))
+            + "\n"
+        )
     planes = [f"{plane.upper()}={_diagonals(factor)}" for plane, factor in factors.items() if factor]
     return f"SET_SKEW CLEAR=1\nSET_SKEW {' '.join(planes)}\n"
 

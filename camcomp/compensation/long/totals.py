@@ -33,7 +33,7 @@ from camcomp.gcode.uncorrected import UncorrectedFeeds, below_step_warning
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 from camcomp.ground.source_lines import MOST_LINES, named_lines
 from camcomp.model.control import limits_of
-from camcomp.model.cutting.assumed import RapidsAtDepth
+from camcomp.model.cutting.assumed import ForceDoubts
 from camcomp.model.cutting.spindle import spindle_warning
 from camcomp.model.job import Job
 from camcomp.model.statics.target import correct, settle
@@ -105,7 +105,7 @@ class Totals:
         self.apart: dict[PathMode, None] = {}  # in which lines are kept from being made one
         self.waiting_s = 0.0  # beside its moves
         self.resting = 0  # end points at which the control rests because of joining lines
-        self._rapids = RapidsAtDepth(job.config)
+        self._doubts = ForceDoubts(config=job.config)
         self._feeds = UncorrectedFeeds(name)
         self._moved = False  # any feed move is corrected
         self._still: list[int] = []  # source lines that cut while the spindle stands, the first ones
@@ -133,7 +133,7 @@ class Totals:
         )  # fmt: skip
         self._plain_control(run, done)
         moves = path_of_run(whole)
-        self._rapids.add(moves)
+        self._doubts.add(moves)
         self._feeds.add(moves)
         self._moved = self._moved or _differ(rows.target, done.written, plain.kind[rows.move] != RAPID)
         if run.state.sense == 0.0:
@@ -198,7 +198,7 @@ class Totals:
         corrected = rows.corrected[own]
         self._odd_control(result, own, part)
         moves = result.program.path.take(np.arange(part.first, part.last))
-        self._rapids.add(moves)
+        self._doubts.add(moves)
         self._feeds.add(moves)
         self._moved = self._moved or _differ(rows.target[own], result.written.end[own], rows.kind[own] != RAPID)
         self._common(
@@ -271,7 +271,7 @@ class Totals:
         feeds = self._feeds.warnings()
         if not (self._moved or feeds) and self._feeds.feeds:
             feeds = [below_step_warning(self._feeds.name, self._feeds.feeds, self.step_mm)]
-        self.warnings = list(dict.fromkeys([*self.job.taken.remarks, *self._rapids.warnings(), *feeds, *warnings]))
+        self.warnings = list(dict.fromkeys([*self.job.taken.remarks, *self._doubts.warnings(), *feeds, *warnings]))
         self.warnings += rest_warning(self.resting)
         for each in self._control:
             each.finish()

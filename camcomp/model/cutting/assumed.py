@@ -56,7 +56,7 @@ def assumed_force(config: Config) -> AssumedForce:
     top = config.workpiece.stock_top_mm
     if top is not None:
         return AssumedForce(model, "stated", f"{cut} on every feed move below Z {top:g} mm")
-    where = "on every feed move, also in air and in finishing passes"
+    where = "on every feed move but plunges, also in air and in finishing passes"
     stated = model != "constant" and process.width_mm is not None
     return AssumedForce(model, "stated" if stated else "none", f"{cut} {where}: no stock is stated ({TWO_WAYS})")
 
@@ -85,16 +85,11 @@ def doubtful_force(config: Config, path: Path) -> list[str]:
     """
     if not _is_assumed(config):
         return []
+    doubts = ForceDoubts(config=config)
+    doubts.add(path)
+    out = doubts.warnings()
     on = np.flatnonzero((path.kind != RAPID) & path.known & ~path.machine)
-    cutters = [config.tools.get(int(number), config.tool) for number in np.unique(path.tool[on])]
-    out = [
-        f"the assumed force is that of a flat end mill, and the tool is a {kind}; {TWO_WAYS}"
-        for kind in sorted({str(each.type) for each in cutters} & {"ball", "drill"})
-    ]
-    rapids = RapidsAtDepth(config)
-    rapids.add(path)
-    out += rapids.warnings()
-    if share := _beside_share(path, on, cutters):
+    if share := _beside_share(path, on, doubts.cutters()):
         out.append(
             f"{100.0 * share:.0f} % of the feed path runs less than one tool diameter beside an earlier pass; "
             f"the assumed force is too large there; {TWO_WAYS}"
@@ -102,11 +97,12 @@ def doubtful_force(config: Config, path: Path) -> list[str]:
     return out
 
 
-@dataclass(eq=False)
-class RapidsAtDepth:
-    """Lateral rapids that begin and end at the depth of the cuts before and behind them, found part by part of a path."""
+@dataclass(eq=False, kw_only=True)
+class ForceDoubts:
+    """Tools of feed moves, and lateral rapids between cuts at their depth, found part by part of a path."""
 
     config: Config
+    tools: set[int] = field(default_factory=set)
     lines: set[int] = field(default_factory=set)
     _flat: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))  # of the last two motions, as the next ones
     _cuts: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
@@ -121,16 +117,26 @@ class RapidsAtDepth:
         cut = level & (path.kind != RAPID) & (True if top is None else path.end[:, 2] < top)
         flat = np.concatenate((self._flat, level & (path.kind == RAPID)))
         cuts, line = np.concatenate((self._cuts, cut)), np.concatenate((self._line, path.line))
+        self.tools |= set(np.unique(path.tool[known & (path.kind != RAPID)]).tolist())
         self.lines |= set(line[1:-1][flat[1:-1] & cuts[:-2] & cuts[2:]].tolist())
         self._flat, self._cuts, self._line = flat[-2:], cuts[-2:], line[-2:]
 
+    def cutters(self) -> list[Cutter]:
+        """The tools of feed moves."""
+        return [self.config.tools.get(number, self.config.tool) for number in sorted(self.tools)]
+
     def warnings(self) -> list[str]:
-        """One warning with the source lines, or none."""
+        """One warning per form of tool that is no flat mill, and one with the source lines of the rapids."""
+        out = [
+            f"the assumed force is that of a flat end mill, and the tool is a {kind}; {TWO_WAYS}"
+            for kind in sorted({str(each.type) for each in self.cutters()} & {"ball", "drill"})
+        ]
         if not self.lines:
-            return []
+            return out
         where = f"G0 at cutting depth between two cuts at {named_lines(sorted(self.lines))}"
         return [
-            f"{where}: the model has no force there, and the machine may cut at rapid speed; retract, or state the stock"
+            *out,
+            f"{where}: the model has no force there, and the machine may cut at rapid speed; retract, or state the stock",
         ]
 
 

@@ -108,7 +108,7 @@ def test_both_verbs_write_to_standard_output(tmp_path, capfd):
     machine(tmp_path, f"{square(ANGLES)}, {PITCH}")
     files = ["--config", str(CARTESIAN), "--config", str(tmp_path / "effects.yaml")]
     assert run(["config", "skew", *files, "--control", "marlin"]) == 0
-    assert capfd.readouterr().out == "M852 I0.0008000 J-0.0005000 K0.0013000\n"
+    assert capfd.readouterr().out == "G21\nM852 I0.0008000 J-0.0005000 K0.0013000\n"
     travel = ["--actuator", "x", "--from-mm", "0", "--to-mm", "10"]
     assert run(["config", "screw-file", *files, *travel, "--control", "heidenhain"]) == 0
     assert capfd.readouterr().out.startswith("AXISPOS,X,BACKLASH\n")

@@ -22,6 +22,16 @@ CASES = [
     (["diagnose", "e.yaml", "--without", "back"], "backlash"),
     (["canon", "a.nc", "--dialect", "gr"], "grbl"),
     (["compensate", "a.nc", "--method", "fix"], "fixed-point"),
+    (["compensate", "a.nc", "--stock", "co"], "comments"),
+    (["config", "screw-file", "--config", str(ROOT / "config/cartesian.yaml"), "--actuator", "x"], "x"),
+    (["config", "show", "--config", "ma"], "file"),
+    (["config", "skew", "--config", "a.yaml", "-o", ""], "file"),
+    (["place", "a.nc", "--report", ""], "file"),
+    (["import", "a.csv", "-o", ""], "dir"),
+    (["import", "a.csv", "--program", "a"], "file"),
+    (["history", ""], "dir"),
+    (["compare", "a.csv", "b"], "file"),
+    (["init", "d", "--from-urdf", "a"], "file"),
     (["comp"], "compensate"),
 ]
 

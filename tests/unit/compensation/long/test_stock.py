@@ -67,3 +67,10 @@ def test_what_is_wrong_with_the_stock_is_told(job):
             job(text=STOCK.replace("min_mm: [-60, -60", "min_mm: [200, 200").replace("[60, 60, 2]", "[300, 300, 2]")),
             between(),
         )
+
+
+@pytest.mark.parametrize("kind", ["ball", "drill"])
+def test_a_tool_that_the_assumed_force_does_not_fit_is_warned_of(job, kind):
+    text = HEAD + "\n".join([*circle(20), "G0 Z9", "M30", "%"]) + "\n"
+    (_, totals, _), _ = both(job(text=f"tool: {{diameter_mm: 6, type: {kind}}}\n"), text)
+    assert any(f"the tool is a {kind}" in each for each in totals.warnings)
