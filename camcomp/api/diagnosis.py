@@ -153,7 +153,8 @@ def diagnose(
     from threadpoolctl import threadpool_limits
 
     # threads of numpy slow small matrices down; in a user's process they are limited here, because numpy is loaded already
-    with threadpool_limits(limits=int(os.environ.get("OPENBLAS_NUM_THREADS", "1")), user_api="blas"):
+    stated = os.environ.get("OPENBLAS_NUM_THREADS", "")
+    with threadpool_limits(limits=max(int(stated), 1) if stated.isdecimal() else 1, user_api="blas"):
         return _diagnosed(experiment, without, library)
 
 

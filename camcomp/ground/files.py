@@ -95,8 +95,8 @@ def _aside() -> BinaryIO:
 
 
 def display_name(path: str | Path) -> str:
-    """Name of an input for messages."""
-    return "<stdin>" if str(path) == STANDARD else str(path)
+    """Name of an input for messages, on one line."""
+    return "<stdin>" if str(path) == STANDARD else str(path).replace("\n", "\\n")
 
 
 def write_all(outputs: Mapping[str, bytes] | Mapping[Path, bytes], *, inputs: Sequence[str | Path] = ()) -> None:

@@ -541,7 +541,7 @@ RULES: dict[str, Rule] = {
     "CC404": Rule(
         "log measures nothing",
         "At least one of the channels tip, encoders, drive forces and dynamometer has to hold numbers.",
-        "check the names of the columns",
+        "check the names of the columns; `camcomp import` takes other names and units",
     ),
     "CC405": Rule(
         "time runs backward",
@@ -604,7 +604,11 @@ RULES: dict[str, Rule] = {
         "A column that the log needs has no counterpart in the table under any usual name.",
         "name it with --column",
     ),
-    "CC422": Rule("cell is not a number", "Cells of a table are numbers or empty.", "delete units and words"),
+    "CC422": Rule(
+        "cell is not a number",
+        "Cells of a table are numbers or empty.",
+        "delete units and words; write dates as 2022-10-11 or 11.10.2022",
+    ),
     "CC423": Rule(
         "recording not readable",
         "A recording of one axis is a MATLAB file with t in s, qg and qm in m and, for forces, vir and gtau.",

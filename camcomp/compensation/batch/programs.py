@@ -15,7 +15,7 @@ from typing import Any
 from camcomp.compensation.batch.worker import Outcome, Task
 from camcomp.gcode.detect import endings
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, format_error
-from camcomp.ground.files import alone_in, read_bytes, write_all
+from camcomp.ground.files import alone_in, display_name, read_bytes, write_all
 from camcomp.ground.places import one_place_each
 from camcomp.model.config.spec import Config
 from camcomp.model.config.yaml_tree import leaves, plain
@@ -157,7 +157,7 @@ def run_batch(
                 continue
             pending[key] = each
             yield Task(
-                name=str(each.source), key=key, data=data, config=plan.config, config_key=config_key,
+                name=display_name(each.source), key=key, data=data, config=plan.config, config_key=config_key,
                 method=plan.method, tolerance_um=plan.tolerance_um, joints=plan.joints, stock=plan.stock,
                 passes=plan.passes,
             )  # fmt: skip

@@ -33,11 +33,16 @@ _HOT_C = 150.0
 _STRONG_N = 20.0
 
 
-def check_rows(name: str, measured: Measured) -> None:
-    """Raise CC404 for a log without measurements, CC405 for times that do not rise, CC407 for temperatures in kelvin."""
+def check_channels(name: str, measured: Measured) -> None:
+    """Raise CC404 for a log without measurements."""
     if not any(measured.has(each) for each in ("tip", "encoder", "drive", "dyno")):
         message = "the log measures nothing: no tip, encoder, drive force or dynamometer column holds a number"
         raise ConfigError("CC404", message, at=Location(name, 1, 1))
+
+
+def check_rows(name: str, measured: Measured) -> None:
+    """Raise CC404 for a log without measurements, CC405 for times that do not rise, CC407 for temperatures in kelvin."""
+    check_channels(name, measured)
     back = np.flatnonzero(np.diff(measured.time) <= 0)
     if len(back):
         row = int(back[0])

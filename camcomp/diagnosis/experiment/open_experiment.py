@@ -9,6 +9,7 @@ import numpy as np
 
 from camcomp.diagnosis.experiment.driven_run import drive
 from camcomp.diagnosis.experiment.log_checks import (
+    check_channels,
     check_clock,
     check_length,
     check_rows,
@@ -149,11 +150,16 @@ def columns_of(twin: Twin) -> LogColumns:
 
 
 def check_log(path: str, config: Config | None) -> None:
-    """Raise the errors of a log on its own: no table, no times, invalid cells; with a config also of its columns."""
+    """Raise the errors of a log on its own: no table, no times, invalid cells; with a config also of its columns.
+
+    Raises ConfigError CC400, CC401, CC403, CC404, CC405, FileError.
+    """
     table = open_log(path)
     if config is not None:
         actuators = config.robot.actuators
-        read_log(table, log_columns(list(actuators), [each.rotary for each in actuators.values()]))
+        measured = read_log(table, log_columns(list(actuators), [each.rotary for each in actuators.values()]))
+        check_channels(table.name, measured)
+        check_clock(table.name, measured)
 
 
 def open_log(path: str) -> CsvTable:

@@ -17,6 +17,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
 MOST_CELLS = 20_000_000  # as many numbers as a log of five million rows and four columns
+MOST_ROWS = 1 << 20  # of a sheet, ECMA-376; its reader keeps something of every row, of empty ones too
 
 
 def read_xlsx(data: bytes, name: str, names: Sequence[str] = ()) -> list[SampledColumns]:
@@ -83,6 +84,7 @@ def _filled_rows(sheet: Any, name: str) -> dict[int, list[Any]]:
         width = max((k + 1 for k, cell in enumerate(row) if _is_filled(cell)), default=0)
         cells += len(row)
         refuse_large(cells, MOST_CELLS, "cells", name)
+        refuse_large(i, MOST_ROWS, "rows in a sheet", name)
         if width:
             out[i] = list(row[:width])
     return out

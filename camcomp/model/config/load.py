@@ -126,10 +126,13 @@ def load_experiment(path: Path | str) -> Experiment:
 
 
 def is_experiment(data: bytes) -> bool:
-    """Whether YAML text is an experiment file: it has `runs` and no `robot`."""
-    return bool(re.search(rb"^(\xef\xbb\xbf)?runs\s*:", data, re.MULTILINE)) and not re.search(
-        rb"^robot\s*:", data, re.MULTILINE
+    """Whether YAML or JSON text is an experiment file: it has `runs` and no `robot`."""
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    start = rb"(?:^|[{,\n])[ \t]*" if data.lstrip().startswith(b"{") else rb"^"
+    runs, robot = (
+        re.search(start + rb"[\"']?" + key + rb"[\"']?\s*:", data, re.MULTILINE) for key in (b"runs", b"robot")
     )
+    return runs is not None and robot is None
 
 
 def _raise(errors: Sequence[CamcompError]) -> None:

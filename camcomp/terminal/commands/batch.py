@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from camcomp.ground import progress
+from camcomp.ground.files import display_name
 from camcomp.terminal.commands._figures import warning_lines
 from camcomp.terminal.commands._options import (
     config_option,
@@ -96,7 +97,7 @@ def command(
 def _tell(status: Status, number: int, total: int) -> None:
     from camcomp.compensation.batch.programs import DONE
 
-    text = f"[{number}/{total}] {status.status}: {status.source}"
+    text = f"[{number}/{total}] {status.status}: {display_name(status.source)}"
     if status.figures:
         before, after = (status.figures[each]["max_um"] for each in ("before", "after"))
         text += f": largest error {before:.1f} um, now {after:.2f} um"

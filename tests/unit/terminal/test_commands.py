@@ -172,7 +172,7 @@ def test_validate_reads_programs(printed, tmp_path):
 def test_validate_checks_an_experiment_with_what_it_names(printed, tmp_path):
     (tmp_path / "machine.yaml").write_bytes(shipped("config/cartesian.yaml").read_bytes())
     (tmp_path / "a.nc").write_text("G21 G90\nG0 X0 Y0 Z5\nG1 X1 F100\nM2\n")
-    (tmp_path / "a.csv").write_text("t_s\n0\n")
+    (tmp_path / "a.csv").write_text("t_s,act_x_mm\n0,1\n")
     text = "config: [machine.yaml]\nruns:\n  - {name: a, program: a.nc, log: a.csv, cutting: true, started_s: 0}\n"
     (tmp_path / "e.yaml").write_text(text)
     assert "ok (experiment, 1 run)" in printed("validate", tmp_path / "e.yaml")

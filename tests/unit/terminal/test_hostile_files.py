@@ -103,6 +103,33 @@ def test_control_characters_are_shown_as_escapes():
     text.encode()
 
 
+def test_a_line_break_in_a_name_makes_no_line_of_its_own(folder, capsys):
+    name = "new\nok.nc"
+    (folder / name).write_text(PROGRAM)
+    run(["validate", name])
+    run(["batch", name, "--config", config(), "--output-dir", "out", "--jobs", "1"])
+    said = capsys.readouterr()
+    assert "new\\nok.nc" in said.out + said.err and "new\nok.nc" not in said.out + said.err
+
+
+def test_validate_refuses_a_log_that_measures_nothing(folder, capsys):
+    (folder / "log.csv").write_text("t_s,x actual [mm]\n0,1\n1,2\n")
+    runs = [{"name": "a", "log": "log.csv", "cutting": False}]
+    (folder / "e.yaml").write_text(json.dumps({"config": [config()], "runs": runs}))
+    assert run(["validate", "e.yaml"]) == 2
+    assert "CC404" in (said := capsys.readouterr().err) and "camcomp import" in said
+    twice = [f"{t},{0.1 * t + lap}" for lap in (0, 1) for t in range(9)]
+    (folder / "log.csv").write_text("\n".join(["t_s,act_x_mm", *twice, ""]))
+    assert run(["validate", "e.yaml"]) == 2
+    assert "CC405" in capsys.readouterr().err
+
+
+def test_a_strange_number_of_threads_is_no_bug(folder, monkeypatch, capsys):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "all")
+    (folder / "e.yaml").write_text(json.dumps({"config": [config()], "runs": []}))
+    assert run(["diagnose", "e.yaml"]) == 2
+
+
 NOT_UTF8 = os.fsdecode(b"b\xff\x1b[31m.nc")
 
 
@@ -226,7 +253,7 @@ def test_a_workbook_of_more_than_any_log_is_refused(folder, monkeypatch):
     for _ in range(30):
         book.active.append(list(range(10)))
     book.save("large.xlsx")
-    for name, most in (("MOST_CELLS", 299), ("MOST_TABLE_BYTES", 1000)):
+    for name, most in (("MOST_CELLS", 299), ("MOST_ROWS", 28), ("MOST_TABLE_BYTES", 1000)):
         with monkeypatch.context() as patched:
             patched.setattr(xlsx_file, name, most)
             with pytest.raises(ConfigError, match="more than") as refused:

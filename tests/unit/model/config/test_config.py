@@ -190,6 +190,8 @@ def test_experiments_are_told_from_machines():
     assert is_experiment(EXPERIMENT.encode())
     assert not is_experiment(b"robot: {}\nruns: []")
     assert not is_experiment(b"a: [")
+    assert is_experiment(b'\xef\xbb\xbf{"config": ["a.yaml"], "runs": []}') and is_experiment(b'{\n  "runs": []\n}')
+    assert not is_experiment(b'{"robot": {}, "runs": []}') and not is_experiment(b'process: {"runs": 1}')
 
 
 @pytest.mark.parametrize(
