@@ -22,7 +22,7 @@ from camcomp.diagnosis.arm.study import studied as study_arm
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
 from camcomp.diagnosis.axis.plausible import check_axes
-from camcomp.diagnosis.axis.predicted import predict_drives, predict_encoders
+from camcomp.diagnosis.axis.predicted import predict_drives, predict_encoders, predict_loads
 from camcomp.diagnosis.axis.study import studied as study_axes
 from camcomp.diagnosis.experiment.log_checks import check_clock
 from camcomp.diagnosis.experiment.open_experiment import open_log, read_log, unread
@@ -162,7 +162,11 @@ def _checked_axes(opened: _Opened) -> dict[str, list[AxisRun]]:
         check_clock(display_name(run.log), log)
     late = [predict_encoders(robot, causes, log, run.started_s) for run, log in runs]
     logs = [
-        replace(log, drive=log.drive - predict_drives(robot, causes, log, run.started_s)) if log.has("drive") else log
+        replace(
+            log,
+            drive=log.drive - predict_drives(robot, causes, log, run.started_s),
+            load=log.load - predict_loads(robot, causes, log, run.started_s),
+        )
         for run, log in runs
     ]
     axes = {

@@ -114,6 +114,15 @@ def test_a_second_encoder_behind_the_gear_shows_its_play(tmp_path):
     assert result.axes_in_detail["J1"]["second_encoder"]["delay_ms"].value == pytest.approx(2.0, abs=0.1)
 
 
+def test_play_that_the_machine_file_has_is_not_found_again(tmp_path):
+    (tmp_path / "arm.yaml").write_text(ARM)
+    play = {"effects": [{"effect": "backlash", "target": "J1", "width_rad": 1.5e-4}]}
+    (tmp_path / "play.yaml").write_text(yaml.safe_dump(play))
+    second_encoder(tmp_path, 1.5e-4, 0.002)
+    result = asked(tmp_path, ["arm.yaml", "play.yaml"], "a")
+    assert (result.verdict, [c.effect for c in result.causes]) == ("none", [])
+
+
 def test_two_encoders_that_agree_show_no_play(tmp_path):
     (tmp_path / "arm.yaml").write_text(ARM)
     second_encoder(tmp_path, 0.0, 0.002)

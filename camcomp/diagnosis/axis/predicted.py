@@ -1,4 +1,4 @@
-"""Encoders and drive forces of a log of axes as the one signal path predicts them, with the effects of the machine file."""
+"""Encoders, second encoders and drive forces of a log of axes as the one signal path predicts them, with the effects of the machine file."""
 
 from __future__ import annotations
 
@@ -74,6 +74,17 @@ def predict_drives(robot: Robot, causes: Sequence[Cause], log: Measured, started
     _, guided = signal_path.driven(drives, motion.names, motion)
     effort = signal_path.drive_forces(drives, motion.names, guided)
     return out if effort is None else out + effort
+
+
+def predict_loads(robot: Robot, causes: Sequence[Cause], log: Measured, started_s: float) -> Floats:
+    """Second encoder minus the one of the motor (n, m), mm or rad, that effects of the drives make; springs are left out."""
+    drives = signal_path.acting(causes, "drive")
+    if not drives or not log.has("load"):
+        return np.zeros_like(log.load)
+    motion = _motion(robot, log, _filled(log.time, log.encoder, robot), started_s)
+    if arm_of(robot) is not None:
+        motion = replace(motion, held=lambda: hang(robot, motion.encoder).drive)
+    return signal_path.driven(drives, motion.names, motion)[0]
 
 
 def _filled(time: Floats, values: Floats, robot: Robot) -> Floats:
