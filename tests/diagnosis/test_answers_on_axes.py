@@ -1,4 +1,4 @@
-"""What camcomp says of logs of axes by a generator that was written from the contract alone: what it has shown."""
+"""Answers on logs of axes, made by a generator that was written from the contract alone."""
 
 import json
 
@@ -16,10 +16,10 @@ def judged(folder, seed):
 
 
 HEALTHY = {
-    31005: "axes that stand beside others: their columns were taken for exchanged",
-    31010: "lost rows and a coarse encoder: accelerations were off by what cubics made of the gaps",
+    31005: "axes that stand while others move",
+    31010: "lost rows and a coarse encoder",
     31020: "single rows of 40 um while the axis moves",
-    31025: "inertia fitted to the noise of encoders in slow runs, told to a fast one",
+    31025: "slow runs and a fast one",
 }
 
 
@@ -32,32 +32,32 @@ def test_an_axis_with_nothing_wrong(tmp_path, seed):
 
 
 WRONG = {
-    31013: "a loop that swings over, in a log that begins while the axis moves",
-    31018: "a push for a while: it was unknown",
+    31013: "overshoot in a log that begins while the axis moves",
+    31018: "a push for a while",
     31021: "one lag of all axes",
-    31028: "friction, whose sense cubics turned round before every stop",
+    31028: "friction",
     31031: "a lag at one speed, which a reversal explains nearly as well",
-    34011: "a loop that swings over: forces belong to what it makes of the set-points",
+    34011: "overshoot with logged forces",
     34012: "friction that differs between the ways, on an axis that goes down and up once",
-    37016: "a push that chose how smooth the motion is taken to be",
+    37016: "a push on a smooth motion",
     37018: "a push of the run that is held out",
-    37027: "a loop that swings over in two runs of four; in the others its axis stands",
-    37041: "what a loop makes of a push",
-    37043: "a push that begins and ends at once, where the axis was that time only",
-    37051: "friction that turns round behind a spring",
+    37027: "overshoot of an axis that moves in two runs of four",
+    37041: "a push that the loop answers",
+    37043: "a short push at a place passed once",
+    37051: "friction behind a spring",
     37057: "one short move in a log of one run",
-    35036: "a loop that swings over and looks late on average",
-    35041: "a clock that trembles, of an axis that rests most of the time",
-    38007: "a loop that swings over, of which its steady sine shows the inertia only",
+    35036: "overshoot that looks late on average",
+    35041: "jitter of an axis that rests most of the time",
+    38007: "overshoot on a steady sine",
     38022: "a push in the middle of friction",
-    38026: "a clock that trembles",
+    38026: "jitter",
     37026: "friction of a hundred times the noise, whose shape is known to a hundredth",
-    45026: "friction of an axis that moves in one of four runs, of which the others foretell nothing",
-    39028: "friction that turns round otherwise where the axis creeps back a little than where it turns",
+    45026: "friction of an axis that moves in one of four runs",
+    39028: "friction of an axis that creeps back a little",
     50012: "friction of an axis that stops after it crept back a thousandth of a millimetre",
     50017: "a lag that differs between the ways by a quarter of the floor",
-    50026: "a stretch of an axis that stands in which noise has heavier tails",
-    37052: "the same on two axes, where reversals fall between two rows",
+    50026: "heavier tails while the axis stands",
+    37052: "one cause on two axes, reversals between rows",
 }
 
 

@@ -1,4 +1,4 @@
-"""What camcomp says of experiments by generators that were written from the contract alone: what they have shown, and a mixture."""
+"""Answers on runs of programs, made by generators that were written from the contract alone."""
 
 import json
 
@@ -29,7 +29,7 @@ def test_a_log_with_empty_set_points_of_a_machine_with_nothing_wrong(tmp_path):
 
 
 def test_a_bending_tool_that_one_run_of_three_shows(tmp_path):
-    """The others are in the air: they say nothing of it, and were held against it."""
+    """The others are in the air and say nothing of it."""
     result, row = judged(tmp_path, "serial", 11032)
     assert result["verdict"] == "identified" and row["held"] == [True]
     assert [each["effect"] for each in result["causes"]] == ["tool_deflection"]
@@ -37,14 +37,14 @@ def test_a_bending_tool_that_one_run_of_three_shows(tmp_path):
 
 @pytest.mark.campaign  # the longest of this file
 def test_a_lag_of_all_axes_is_no_clock_where_forces_are_logged_and_encoders_are_not(tmp_path):
-    """Forces and what bends under them come as late as the axes; of set-points' forces a clock made the tip's late, by itself."""
+    """Forces and what bends under them come as late as the axes; a late clock would shift the tip only."""
     result, row = judged(tmp_path, "serial", 44084)
     assert result["verdict"] == "identified" and row["all"] and not row["false_cause"]
 
 
 @pytest.mark.campaign  # the longest of this file
 def test_a_cause_that_leaves_the_gap_as_it_is_is_not_sure(tmp_path):
-    """A loop that rings after every corner, tip alone: 25 um were left of 25 by an overshoot that was sure."""
+    """A loop that rings after every corner, tip alone: an overshoot leaves the gap as it is."""
     with recording.taken_from("spirals"):
         result, row = judged(tmp_path, "serial", 59015)
     assert result["verdict"] in ("ambiguous", "unknown") and not row["false_cause"]
@@ -118,6 +118,7 @@ def test_what_is_minor_and_when_it_happened_are_known(tmp_path, seed):
         ("serial", 7033, {"link_stiffness", "tool_wear"}),
         ("parallel", 9510, set()),
     ],
+    ids=["springs and a screw", "springs and a force", "springs and a worn tool", "two causes that undo each other"],
 )
 def test_rows_follow_their_own_force(tmp_path, generator, seed, named):
     """In corners that are rounded off, and while the tool rests in its cut; in the last one two causes undo each other."""
