@@ -67,7 +67,10 @@ def driven(folder, machine, wrong):
 
 @pytest.mark.parametrize(
     ("machine", "target", "size", "term", "unit"),
-    [("orthoglide", "x", 1.2, "load_y_N", "mm/N"), ("kuka-kr210", "A3", 7.0, "load_A4_Nmm", "rad/N mm")],
+    [
+        ("orthoglide", "x", 1.2, "load_y_N", "mm/N"),
+        pytest.param("kuka-kr210", "A3", 7.0, "load_A4_Nmm", "rad/N mm", marks=pytest.mark.campaign),
+    ],
 )
 def test_a_drive_that_another_drives_load_moves_is_told_so_and_its_spring_not_blamed(
     tmp_path, machine, target, size, term, unit

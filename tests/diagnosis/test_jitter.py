@@ -10,7 +10,7 @@ from camcomp.diagnosis.fit.noise import jitter
 from tests.diagnosis.conftest import plan_of
 
 
-@pytest.mark.parametrize("unsteady", [3e-4, 1e-3])
+@pytest.mark.parametrize("unsteady", [pytest.param(3e-4, marks=pytest.mark.campaign), 1e-3])
 def test_jitter_is_measured(workshop, unsteady):
     plan = plan_of(design="six", samples=250)
     plan = replace(plan, noise=replace(plan.noise, jitter_s=unsteady))
