@@ -176,8 +176,7 @@ def play_between(x: Floats, low: Floats, high: Floats) -> Floats:
 
 
 @kept
-def _direction(x, distance):  # type: ignore[no-untyped-def]  # pragma: no cover
-    y = np.zeros_like(x)
+def _direction(x, distance, y):  # type: ignore[no-untyped-def]  # pragma: no cover
     for j in range(x.shape[1]):
         state = 0.0
         for i in range(1, x.shape[0]):
@@ -186,7 +185,6 @@ def _direction(x, distance):  # type: ignore[no-untyped-def]  # pragma: no cover
             if step != 0.0:
                 state = sign + (state - sign) * np.exp(-abs(step) / distance)
             y[i, j] = state
-    return y
 
 
 def direction(x: Floats, distance: float = PRESLIDING_MM) -> Floats:
@@ -194,7 +192,8 @@ def direction(x: Floats, distance: float = PRESLIDING_MM) -> Floats:
 
     Source: Dahl 1968 with exponent 1. Holds while: rate-independent friction.
     """
-    out: Floats = _direction(np.ascontiguousarray(x), distance)
+    out: Floats = np.zeros(x.shape)
+    _direction(np.ascontiguousarray(x), distance, out)
     return out
 
 

@@ -10,6 +10,7 @@ The cubes depend on the machine, the range of forces and the origin of the progr
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -17,19 +18,21 @@ from typing import Any
 import numpy as np
 
 from camcomp.compensation.long.kernel import (
+    BASIC,
     BIAS,
     EXACT,
     LEVELS,
     MOST_DEGREE,
     SPLIT,
     exponents,
+    look_up,
     missing_cells,
     put_cells,
 )
 from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.statics.machine import Machine
-from camcomp.model.statics.solve import FREE, TARGET, solve
+from camcomp.model.statics.solve import FREE, TARGET, solve, threads
 
 CELL_MM = 24.0  # mm, edge of the largest cubes
 ALLOWED = 2.5e-5  # mm, error of a tile at its test points; half of what a program's points may show at the end
@@ -47,6 +50,7 @@ EVEN = 1.1127756842787055 ** -np.arange(1.0, 7.0)  # multiples fill the cube eve
 NARROW = 6.0  # a force component so many times smaller than the largest needs a degree less in position
 WIDER = 1.25  # limits of the force range are powers of it, so that programs with about the same forces share cubes
 NO_FORCE_N = 1e-9
+SLICE = 4096  # rows that a thread takes at once
 _ZERO = np.zeros(3)
 
 
@@ -211,6 +215,27 @@ class Field:
                 break
             self._build(np.unique(room[:count]))
         return tips
+
+    def look(self, target: Floats, force: Floats | None, *, every: bool = True) -> tuple[Floats, Floats, Ints]:
+        """Answers (n, .) as in look_up for targets (n, 3) under forces (n, 3); nominal joints; tiles (n,), negative: none.
+
+        Without forces the joints only.
+        """
+        n, m = len(target), len(self.machine.actuators)
+        outputs = 0 if force is None else 9 + 2 * m if every else BASIC
+        answer, nominal = np.empty((n, outputs)), np.empty((n if every else 0, m))
+        force = np.zeros((n, 3)) if force is None else force
+        near = self.prepare(target, force)
+        tile = np.empty(n, np.int64)
+        packed = self.packed()
+
+        def work(a: int) -> None:
+            look_up(a, min(a + SLICE, n), m, every, near, force, answer, nominal, tile, *packed)
+
+        with ThreadPoolExecutor(threads()) as pool:
+            list(pool.map(work, range(0, n, SLICE)))
+        self.mark(tile)
+        return answer, nominal, tile
 
     def packed(self) -> tuple[Any, ...]:
         """Arguments of the compiled look-up: cells, tiles, bases. The terms of a basis are the first ones of the largest."""

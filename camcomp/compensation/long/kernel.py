@@ -257,10 +257,11 @@ def look_up(
 ) -> None:  # fmt: skip
     """Answers (n, 9 + 2 m) at targets (n, 3) under forces (n, 3) for rows a to b; tile_of (n,), negative: there is none.
 
-    every: all outputs and nominal joints (n, m); otherwise correction and shift only. packed: those of a Field.
+    every: all outputs and nominal joints (n, m), or with an answer (n, 0) the joints only; otherwise correction and shift only.
+    packed: those of a Field.
     """
     *_, shape, count = packed
-    outputs, along, across = 9 + 2 * m if every else BASIC, shape[:, 2].max(), count.shape[1]
+    outputs, along, across = max(answer.shape[1], m), shape[:, 2].max(), count.shape[1]
     room = (
         np.empty((MOST_DEGREE + 4, MOST_DEGREE + 1, LANES)),
         np.zeros((6, LANES)),
@@ -273,7 +274,7 @@ def look_up(
 def look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, size, keys, values, centre, half, rung, first, W, mid, wide,
                  shape, count, T, U, A, B, C, out):  # fmt: skip
     """look_up with room to work in, T and U as in `terms`, the others (LANES, most terms or outputs), finite."""
-    outputs = out.shape[1]
+    outputs = answer.shape[1]
     i = a
     while i < b:
         tile, _ = find_tile(keys, values, size, target[i, 0], target[i, 1], target[i, 2])
@@ -294,16 +295,18 @@ def look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, size, 
                 U[3 + k, lanes] = (f[k] - mid[k]) / wide[k]
             lanes += 1
         terms(along, U, 0, T, A)
-        terms(across, U, 3, T, B)
-        for lane in range(lanes):
-            n = products(A, B, count[r, :outer], C, lane)
-        contract(W, first[tile], C, n, outputs, out)
+        n = count[r, :outer].sum()
+        if outputs > 0:
+            terms(across, U, 3, T, B)
+            for lane in range(lanes):
+                products(A, B, count[r, :outer], C, lane)
+            contract(W, first[tile], C, n, outputs, out)
         for lane in range(lanes):
             tile_of[i + lane] = tile
             for k in range(outputs):
                 answer[i + lane, k] = out[lane, k]
         if every:
-            contract(W, first[tile] + outputs * n, A, inner, m, out)
+            contract(W, first[tile] + (9 + 2 * m) * n, A, inner, m, out)
             for lane in range(lanes):
                 for k in range(m):
                     nominal[i + lane, k] = out[lane, k]

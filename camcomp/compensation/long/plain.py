@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.bands.scatter import best_share, excess
 from camcomp.compensation.long.engagement import RunEngagement
 from camcomp.compensation.long.field import Field, Tiles
-from camcomp.compensation.long.kernel import BASIC, follow, look_up
+from camcomp.compensation.long.kernel import follow
 from camcomp.compensation.long.loads import Edge, Loads, constant_of, joints_at, loads_of
 from camcomp.compensation.long.output_state import OutputState
 from camcomp.compensation.long.plain_run import Middles, NotInPieces, PlainRun, Unsolved
@@ -26,7 +25,7 @@ from camcomp.gcode.plain_rows import MAX_ROW_BYTES, write_rows
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 from camcomp.model.control import limits_of
 from camcomp.model.job import Job
-from camcomp.model.statics.solve import FREE, TARGET, inverse, solve, threads
+from camcomp.model.statics.solve import FREE, TARGET, inverse, solve
 from camcomp.model.trajectory.moves import line_moves
 
 ROUNDS = 5
@@ -38,7 +37,6 @@ MODELS = (
     "kienzle",
 )  # whose force does not depend on the way from the program's start
 COARSE_MM = 1e-3  # a control with larger steps moves the joints by more than first order tells
-SLICE = 4096  # rows that a thread takes at once
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -317,18 +315,7 @@ class PlainCorrector:
         target, force = self.job.frame.to_machine(target), self.job.frame.vectors(force)
         known = self.field
         assert known is not None
-        near = known.prepare(target, force)
-        n, m = len(target), len(self.machine.actuators)
-        answer, nominal = np.empty((n, 9 + 2 * m if every else BASIC)), np.empty((n if every else 0, m))
-        tile = np.empty(n, np.int64)
-        packed = known.packed()
-
-        def work(a: int) -> None:
-            look_up(a, min(a + SLICE, n), m, every, near, force, answer, nominal, tile, *packed)
-
-        with ThreadPoolExecutor(threads()) as pool:
-            list(pool.map(work, range(0, n, SLICE)))
-        known.mark(tile)
+        answer, nominal, tile = known.look(target, force, every=every)
         lost = np.flatnonzero(tile < 0)
         if len(lost):
             self.exact += len(lost)

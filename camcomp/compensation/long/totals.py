@@ -13,10 +13,12 @@ from camcomp.compensation.long.plain import CorrectedRun, PlainCorrector
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.result import (
+    BOUND_UM,
     CycleTime,
     ErrorSize,
     Interpolation,
     Summary,
+    interpolation_failed,
     job_figures,
     worse_than_before,
 )
@@ -40,7 +42,6 @@ from camcomp.model.statics.target import correct, settle
 from camcomp.model.trajectory.moves import line_moves, moves_of
 
 SAME_MM = 1e-9  # of a place as programmed and as written
-BOUND_UM = 0.05  # no point may differ by more from its exact solution
 SAMPLE, SAMPLE_SHARE = 1000, 0.05  # points that are solved exactly, at most and of all
 
 
@@ -353,12 +354,7 @@ class Totals:
                 unit, k = ("deg", 180.0 / np.pi) if self.job.machine.revolute[a] else ("mm", 1.0)
                 span, lines = f"{k * low:g} to {k * high:g} {unit}", named_lines(self._beyond[a])
                 out.append(("CC602", f"actuator {name} leaves its travel {span} at {lines}"))
-        if self.interpolated and not self.interpolated.worst_um <= BOUND_UM:
-            text = (
-                f"{self.interpolated.worst_um:.3f} um between interpolated and exact points, more than {BOUND_UM:g} um"
-            )
-            out.append(("CC607", text))
-        return out
+        return out + interpolation_failed(self.interpolated)
 
 
 def _differ(target: Floats, written: Floats, feed: Bools) -> bool:

@@ -52,6 +52,9 @@ class CycleTime(Result):
     after: float
 
 
+BOUND_UM = 0.05  # no interpolated point may differ by more from its exact solution
+
+
 class Interpolation(Result):
     """Of a long program: how many points were solved exactly, and how far a sample is from its exact solution."""
 
@@ -61,6 +64,13 @@ class Interpolation(Result):
     worst_drive_force: Size
     tiles: int
     exact_solutions: int
+
+
+def interpolation_failed(found: Interpolation | None) -> list[tuple[str, str]]:
+    """CC607 and its text where a sample of the program is too far from its exact solutions."""
+    if found is None or found.worst_um <= BOUND_UM:
+        return []
+    return [("CC607", f"{found.worst_um:.3f} um between interpolated and exact points, more than {BOUND_UM:g} um")]
 
 
 class ExpectedError(Result):

@@ -95,12 +95,12 @@ def respond(
     if not job.causes:
         loaded, settled = settle(job.real_machine, told, travel.force, None, aim, rotation=travel.rotation)
         return _finite(job, job.frame.to_program(loaded), settled)
-    nominal = inverse(job.real_machine, told, travel.rotation)
+    nominal = _set_points(job, told, travel)
     setpoint = nominal if rho is None else rho
     motion = _motion(job, setpoint, travel)
     loading = cache(partial(signal_path.loaded, job.causes, motion, travel.force))
     if aim is not None:
-        nominal = inverse(job.real_machine, aim, travel.rotation)
+        nominal = _set_points(job, aim, travel)
     masses = cache(partial(_mass_loads, job, nominal, travel)) if has_moved_mass(job.real_machine.robot) else None
     held = cache(partial(_held, job, told, motion, travel))
     motion = replace(motion, names=job.real_machine.actuators, held=held, told=lambda: commanded, masses=masses)
@@ -119,6 +119,14 @@ def respond(
     tip = signal_path.placed(job.causes, signal_path.clamped(job.causes, tip), load, motion)
     state = replace(state, commanded=told, rho=setpoint, rho_nominal=nominal, drive=drive)
     return _finite(job, tip, Correction.of(state, state.passes))
+
+
+def _set_points(job: Job, told: Floats, travel: Travel) -> Floats:
+    """Set-points (n, m) of commanded tips (n, 3), machine frame."""
+    answers = job.real_machine.answers
+    if answers is not None and travel.rotation is None:
+        return answers.set_points(told, travel.force)  # type: ignore[no-any-return]
+    return inverse(job.real_machine, told, travel.rotation)
 
 
 def _held(job: Job, told: Floats, motion: Motion, travel: Travel) -> Floats:
@@ -186,8 +194,9 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
         commanded = commanded + _through_play(job, found, travel)
         share, least, near, job = 1.0, np.inf, commanded, job.correctable
         rings = bool(signal_path.acting(job.causes, "control"))
+        near_target = target if has_moved_mass(job.real_machine.robot) else None  # masses move with the target
         for _ in range(MAX_AIM_STEPS):
-            tip, state = respond(job, commanded, travel, target)
+            tip, state = respond(job, commanded, travel, near_target)
             left = target - tip
             size = float(np.nansum(left**2))
             if rings and size > FARTHER * least:  # an oscillating loop overshoots
@@ -273,7 +282,7 @@ def without_drives(
     load = Load(travel.force, np.zeros((len(target), 6)))
     if job.causes:
         told = job.frame.to_machine(target)
-        nominal = inverse(job.real_machine, told, travel.rotation)
+        nominal = _set_points(job, told, travel)
         load = signal_path.loaded(job.causes, _motion(job, nominal, travel), travel.force)
     aim = job.frame.to_machine(target)
     return correct(job.real_machine, aim, load.force, load.wrench, method, pose=pose, rotation=travel.rotation)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ class Machine:
     rigid: Packed
     joint_var: NDArray[np.int64]  # (c, rigid variables) -> entry in z of the elastic chain, -1 none
     start_y: Array  # (c, rigid variables) nominal joint coordinates at the start pose
+    answers: Any = None  # solves FREE and TARGET without wrench by interpolation; None: exactly
 
     @property
     def actuators(self) -> tuple[str, ...]:

@@ -112,6 +112,9 @@ def solve(
     `near`. check: verify stability.
     """
     n, m = len(near), len(machine.actuators)
+    able = aim is None and aim_rotation is None and check and not keep and (wrench is None or not np.any(wrench))
+    if machine.answers is not None and mode in (FREE, TARGET) and able:
+        return machine.answers.solve(mode, near, _per_point(force, n, (3,)), rho)  # type: ignore[no-any-return]
     tool = np.ascontiguousarray(machine.robot.tool, float)
     aim = np.ascontiguousarray(near if aim is None else aim, float)
     near, R_near, R_aim = _starts_and_aims(machine, mode, near, aim_rotation)

@@ -1,0 +1,124 @@
+"""A machine whose exact solutions are replaced by interpolation between them, for programs that are corrected as a whole."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+
+from camcomp.compensation.long.field import Field
+from camcomp.compensation.long.tile_files import TileFiles
+from camcomp.compensation.program.result import BOUND_UM, Interpolation
+from camcomp.ground.datatypes import Floats, Ints
+from camcomp.model.job import Job
+from camcomp.model.statics.machine import Machine
+from camcomp.model.statics.solve import FREE, TARGET, State, inverse, solve
+from camcomp.model.statics.target import correct, settle
+
+MOST_STEPS, STEP_MM = 20, 1e-6  # the slopes of a cube are those of its centre: every step leaves a tenth
+SAMPLE = 1000  # points that are solved exactly, at most
+
+
+class Answers:
+    """Solutions of a machine with three actuators. Points n, actuators m; machine frame, mm, N, rad."""
+
+    def __init__(self, machine: Machine, middle: Floats) -> None:
+        """Take a machine; middle (3,) mm is the origin of the program."""
+        self.machine, self._middle = machine, middle
+        self._field: Field | None = None
+        self._exact = 0
+
+    def solve(self, mode: int, near: Floats, force: Floats, rho: Floats | None) -> State:
+        """Solved points (n,) as `solve` has them, in FREE or TARGET; where no cube is good enough, solved exactly."""
+        known, n, m = self._known(force), len(near), len(self.machine.actuators)
+        answer, nominal, tile = known.look(near, force)
+        tip, commanded = near, near + answer[:, :3]
+        if mode != TARGET:
+            commanded = near
+            if rho is not None:
+                commanded = self._tips(rho, near, nominal, tile)
+            shift, _, within = known.look(commanded, force, every=False)
+            tip = commanded + shift[:, 3:6]
+            answer, _, inside = known.look(tip, force)
+            tile = np.minimum(tile, np.minimum(within, inside))
+            own = nominal if rho is None else rho
+        else:
+            own = nominal + answer[:, 9 + m :]
+        held = np.broadcast_to(self.machine.nominal.held_rotation, (n, 3, 3))
+        out = State(
+            tip=tip, rotation=held, tilt=answer[:, 6:9], commanded=near if mode != TARGET else commanded, rho=own,
+            rho_nominal=nominal, drive=answer[:, 9 : 9 + m], force=force, status=np.zeros(n, np.int64),
+            passes=np.zeros(n, np.int64), x=np.zeros((0, 0, 0)), F=np.zeros((0, 0, 6)), commanded_rotation=held,
+            wrench=np.zeros((n, 6)),
+        )  # fmt: skip
+        return self._with_exact(out, np.flatnonzero(tile < 0), mode=mode, near=near, force=force, rho=rho)
+
+    def set_points(self, tip: Floats, force: Floats) -> Floats:
+        """Set-points (n, m) of commanded tips (n, 3); force (n, 3): that acts there."""
+        _, out, tile = self._known(force).look(tip, None)
+        lost = np.flatnonzero(tile < 0)
+        if len(lost):
+            out[lost] = inverse(self.machine, tip[lost])
+        return out
+
+    def _known(self, force: Floats) -> Field:
+        if self._field is None:
+            self._field = Field(self.machine, force, self._middle, TileFiles(self.machine))
+        return self._field
+
+    def _tips(self, rho: Floats, near: Floats, nominal: Floats, tile: Ints) -> Floats:
+        """Tips (n, 3) whose set-points are rho (n, m), from tips `near` with set-points `nominal`: Newton's method."""
+        known = self._known(near)
+        rates, out = np.linalg.inv(known.tiles.rates[np.maximum(tile, 0)]), near
+        for _ in range(MOST_STEPS):
+            step = np.einsum("nij,nj->ni", rates, rho - nominal)
+            out = out + step
+            if not np.abs(step).max(initial=0.0) > STEP_MM:
+                break
+            nominal = known.look(out, None)[1]
+        return out
+
+    def _with_exact(
+        self, state: State, rows: Ints, *, mode: int, near: Floats, force: Floats, rho: Floats | None
+    ) -> State:
+        if not len(rows):
+            return state
+        self._exact += len(rows)
+        own = solve(self.machine, mode, near[rows], force=force[rows], rho=None if rho is None else rho[rows])
+        changed = {}
+        for each in fields(State):
+            value = getattr(state, each.name)
+            if len(value) == len(near):
+                changed[each.name] = value = np.array(value)
+                value[rows] = getattr(own, each.name)
+        return replace(state, **changed)
+
+    def proof(self, target: Floats, force: Floats) -> Interpolation | None:
+        """Differences of a sample of points (n, 3) under forces (n, 3) to their exact solutions; None: nothing was asked."""
+        if self._field is None:
+            return None
+        chosen = np.random.default_rng(len(target)).permutation(len(target))[:SAMPLE]
+        p, f = target[chosen], force[chosen]
+        aimed, free = self.solve(TARGET, p, f, None), self.solve(FREE, p, f, None)
+        exact = correct(self.machine, p, f)
+        tip, settled = settle(self.machine, p, f)
+        reach = np.where(self.machine.revolute, 1000.0, 1.0)
+        gaps = (aimed.commanded - exact.commanded, free.tip - tip, (aimed.rho - exact.rho) * reach)
+        worst = max(1e3 * float(np.abs(each).max()) for each in gaps)
+        self._field.keep(sound=worst <= BOUND_UM)
+        used = self._field.used
+        return Interpolation(
+            bound_um=BOUND_UM, checked=len(p), worst_um=worst if np.isfinite(worst) else float("inf"),
+            worst_drive_force=float(np.nan_to_num(np.abs(free.drive - settled.drive), nan=np.inf).max()),
+            tiles=int(used.sum()),
+            exact_solutions=int(self._field.tiles.solved[used].sum()) + 2 * len(p) + self._exact,
+        )  # fmt: skip
+
+
+def with_answers(job: Job) -> Job:
+    """The job with a machine that answers by interpolation."""
+    other = replace(job)
+    machine = job.real_machine
+    vars(other)["real_machine"] = replace(machine, answers=Answers(machine, job.frame.origin))
+    vars(other)["causes"] = job.causes
+    return other
