@@ -117,7 +117,9 @@ def compensate(
         from camcomp.compensation.program.mirror import mirrored
 
         machine = mirrored(machine, source.path, mirror)
-    done = story.compensate(
+    from camcomp.compensation.long.answers import compensate_whole
+
+    done = compensate_whole(
         source, machine, method=method or settings.method, tolerance_um=tolerance, version=__version__, arcs=arcs
     )
     return CompensatedProgram(done, machine, tolerance)

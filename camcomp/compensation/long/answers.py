@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 
 from camcomp.compensation.long.field import Field
 from camcomp.compensation.long.tile_files import TileFiles
+from camcomp.compensation.program.compensate import Compensated, compensate
 from camcomp.compensation.program.result import BOUND_UM, Interpolation
+from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.job import Job
 from camcomp.model.statics.machine import Machine
@@ -16,10 +19,11 @@ from camcomp.model.statics.solve import FREE, TARGET, State, inverse, solve
 from camcomp.model.statics.target import correct, settle
 
 MOST_STEPS, STEP_MM = 20, 1e-6  # the slopes of a cube are those of its centre: every step leaves a tenth
+LEAST_MOTIONS = 2000  # from which new cubes pay
 SAMPLE = 1000  # points that are solved exactly, at most
 
 
-class Answers:
+class InterpolatedMachine:
     """Solutions of a machine with three actuators. Points n, actuators m; machine frame, mm, N, rad."""
 
     def __init__(self, machine: Machine, middle: Floats) -> None:
@@ -115,10 +119,21 @@ class Answers:
         )  # fmt: skip
 
 
+def compensate_whole(program: Program, job: Job, *, method: str, **settings: Any) -> Compensated:
+    """`compensate` for a whole program: long ones with effects, on machines with three actuators, by interpolation."""
+    able = method == "newton" and len(job.real_machine.actuators) == 3 and not job.config.uncertain
+    if not (able and job.causes and len(program.path) >= LEAST_MOTIONS):
+        return compensate(program, job, method=method, **settings)
+    job = with_answers(job)
+    found = compensate(program, job, method=method, **settings)
+    at = job.frame.to_machine(found.rows.target), job.frame.vectors(found.rows.force)
+    return replace(found, interpolated=job.real_machine.answers.proof(*at))
+
+
 def with_answers(job: Job) -> Job:
     """The job with a machine that answers by interpolation."""
     other = replace(job)
     machine = job.real_machine
-    vars(other)["real_machine"] = replace(machine, answers=Answers(machine, job.frame.origin))
+    vars(other)["real_machine"] = replace(machine, answers=InterpolatedMachine(machine, job.frame.origin))
     vars(other)["causes"] = job.causes
     return other

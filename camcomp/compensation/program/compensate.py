@@ -68,7 +68,6 @@ from camcomp.model.statics.target import Correction, settle
 from camcomp.model.stock.warnings import stock_remarks, stock_warnings
 
 MAX_ROUNDS, ARC_ROUNDS = 6, 4
-LEAST_MOTIONS = 2000  # from which interpolation pays
 STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
 WITH_SHARES = 0.7  # of the tolerance at the points looked at: where the share bends, more is missed between them
 COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
@@ -175,19 +174,12 @@ def compensate(
     because their neighbours depend on them: they are not divided, and their errors do not count. engaged: what the tool
     meets along the path, when the program has been followed through its stock before.
     """
-    if part is None and _is_interpolated(program, job, method):
-        from camcomp.compensation.long.answers import with_answers
-
-        job = with_answers(job)
     wanted = job.config.compensation.arcs if arcs is None else arcs
     engaged = engaged or job.engaged(program)
     asked = partial(
         _compensated, program, job, engaged, method=method, tolerance_um=tolerance_um, version=version, part=part
     )
     found = asked(arcs=bool(wanted))
-    if job.real_machine.answers is not None:
-        at = job.frame.to_machine(found.rows.target), job.frame.vectors(found.rows.force)
-        found = replace(found, interpolated=job.real_machine.answers.proof(*at))
     own = slice(None) if part is None else slice(part.first, part.last)
     able = bool((program.path.kind[own] == ARC).any()) and not job.causes
     if wanted is None and able and (found.control.leaves_room(tolerance_um) or found.control.apart):
@@ -197,12 +189,6 @@ def compensate(
         if as_good or other.control.better_than(found.control, tolerance_um):
             return other
     return found
-
-
-def _is_interpolated(program: Program, job: Job, method: str) -> bool:
-    """Whether points are solved by interpolation: in long programs with effects on machines with three actuators."""
-    able = method == "newton" and len(job.real_machine.actuators) == 3 and not job.config.uncertain
-    return able and bool(job.causes) and len(program.path) >= LEAST_MOTIONS
 
 
 def _compensated(

@@ -146,7 +146,7 @@ def summary(result: Compensated, job: Job) -> Summary:
             "control_mode_stated": result.control.stated,
             "under_control": error_size(result.control.error),
             **({} if result.bands is None else band_figures(result.bands.totals, job.config.compensation.policy)),
-            "interpolation": result.interpolated,
+            **({} if result.interpolated is None else {"interpolation": result.interpolated}),
             "warnings": result.warnings,
         }
     )

@@ -6,7 +6,6 @@ import pytest
 from camcomp.api.compensation import compensate
 from camcomp.compensation.long import answers as answers_module
 from camcomp.compensation.long.answers import with_answers
-from camcomp.compensation.program import compensate as story
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.job import Job
@@ -44,7 +43,7 @@ def both(job, program):
     """The same program solved exactly and by interpolation."""
     exact = compensate(program, job)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(story, "LEAST_MOTIONS", 500)
+        patch.setattr(answers_module, "LEAST_MOTIONS", 500)
         return exact, compensate(program, job)
 
 
@@ -65,15 +64,15 @@ def test_the_summary_says_how_far_a_sample_is_from_exact_solutions(both):
 
 
 def test_a_sample_too_far_from_its_exact_solutions_fails_the_program(job, program, monkeypatch):
-    monkeypatch.setattr(story, "LEAST_MOTIONS", 500)
-    whole = answers_module.Answers.solve
+    monkeypatch.setattr(answers_module, "LEAST_MOTIONS", 500)
+    whole = answers_module.InterpolatedMachine.solve
 
     def bent(self, mode, near, force, rho):
         found = whole(self, mode, near, force, rho)
         found.commanded[:] += 1e-4 * (mode == TARGET)
         return found
 
-    monkeypatch.setattr(answers_module.Answers, "solve", bent)
+    monkeypatch.setattr(answers_module.InterpolatedMachine, "solve", bent)
     assert "CC607" in {rule for rule, _ in compensate(program, job).failed}
 
 
