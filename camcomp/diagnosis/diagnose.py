@@ -223,7 +223,7 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
     """Parameter values with 95 % intervals; intervals of derived values follow by their slopes in the fitted
     coordinates.
     """
-    idle = _idle_shapes(problem, cause)
+    idle, wide = _idle_shapes(problem, cause), 1.96 * calibration_of("programs").interval
     kinds = {p.name: p for p in cause.effect.PARAMETERS}
     d = len(f.theta)
     shapes = problem.shapes_of(f.members)
@@ -248,7 +248,7 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
         if name == "phase_rad":
             change = np.angle(np.exp(1j * change))
         slope = change / steps
-        half = 1.96 * float(np.sqrt(slope @ covariance @ slope))
+        half = wide * float(np.sqrt(slope @ covariance @ slope))
         if kinds[name].placed:
             half = ROWS_OF_AN_INSTANT * max(float(np.median(np.diff(t))) for t in problem.times if len(t) > 1)
         ends = [here[name] - half, here[name] + half]

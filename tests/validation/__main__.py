@@ -14,7 +14,7 @@ from pathlib import Path
 
 import click
 
-from tests.validation import counting, report, store
+from tests.validation import calibration, counting, report, store
 from tests.validation.generators import FIRST, GENERATORS, seed_rows
 from tests.validation.measured import bench
 
@@ -55,16 +55,15 @@ def run(name: str, count: int, minutes: float | None, processes: int, only: tupl
 
 
 @main.command("calibrate")
+@click.argument("kind", type=click.Choice([*calibration.KINDS]))
 @click.argument("rows", type=click.Path(path_type=Path))
 @click.option("--count", default=60, help="Development seeds in all, those of ROWS included.")
 @click.option("--minutes", type=float, help="Begin no experiment after that.")
-def calibrate(rows: Path, count: int, minutes: float | None) -> None:
-    """Answer poses of development seeds into the file ROWS, fit the calibration maps and store them in the package."""
-    from tests.validation.poses import calibrate as poses
-
-    for row in poses.answered(rows, count, minutes):
+def calibrate(kind: str, rows: Path, count: int, minutes: float | None) -> None:
+    """Answer logs of development seeds into the file ROWS, fit the calibration maps and store them in the package."""
+    for row in calibration.answered(kind, rows, count, minutes):
         click.echo(f"{row['name']} {row.get('failed') or row['verdict']} {row.get('calibration', '')}", err=True)
-    poses.store(rows)
+    calibration.store(kind, rows)
 
 
 def _measured(only: tuple[str, ...], again: bool) -> None:

@@ -259,11 +259,17 @@ class Problem:
 
     def theta_without(self, f: Fitted, k: int, members: Members | None = None) -> Floats:
         """The coordinates of the members, or of some of them by themselves, fitted without run k, about the fit to all runs."""
+        return self.determined_without(f, k, members)[0]
+
+    def determined_without(self, f: Fitted, k: int, members: Members | None = None) -> tuple[Floats, Floats]:
+        """The same, and their standard deviations."""
         members = f.members if members is None else members
         index, at = self.member_columns(members), self.member_columns(f.members)
         if len(f.grams) == 1 or not members:
-            return np.asarray(f.theta[[at.index(c) for c in index]], float)
-        return self._bounded(members, estimate(total(f.grams) - f.grams[k], self.prior, index, f.factor)[0][index])
+            here = np.array([at.index(c) for c in index], int)
+            return f.theta[here], np.sqrt(np.diag(f.covariance))[here]
+        mean, covariance = estimate(total(f.grams) - f.grams[k], self.prior, index, f.factor)
+        return self._bounded(members, mean[index]), np.sqrt(np.diag(covariance)[index])
 
     def _stacked(self, k: int, moved: Sequence[Floats | None], index: Sequence[int]) -> Floats:
         """White columns (w, d) of run k: those that were worked out anew, and the nominal ones of the others."""

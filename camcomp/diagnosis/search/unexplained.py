@@ -20,8 +20,9 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import BLOCK
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 
+UNDETERMINED = 0.5  # of a cause's size: runs that know it to no better say nothing of it
 FEW_RUNS = 3  # from which on causes are fitted to the other runs
 KINDS = ("tip", "encoder", "drive", "dyno")
 SURE_Z = 5.0  # standard deviations of chance
@@ -59,13 +60,17 @@ def unexplained(problem: Problem, f: Fitted) -> dict[str, Unexplained]:
 
 
 def _left(problem: Problem, f: Fitted, k: int) -> Floats:
-    """Channels (n, c) of run k that the causes, fitted to the other runs, and the usual small errors leave."""
+    """Channels (n, c) of run k that the causes, fitted to the other runs, and the usual small errors leave.
+
+    A cause that the other runs do not determine (they are all in the air, and it bends the tool) has its value of all runs.
+    """
     bench = problem.bench
     theta = f.theta
     if len(bench.runs) >= FEW_RUNS:
         widths = [len(problem.candidates.columns[i]) for i in f.members]
         passing = np.repeat([problem.passing(i) for i in f.members], widths).astype(bool)
-        theta = np.where(passing, theta, problem.theta_without(f, k))
+        without, doubt = problem.determined_without(f, k)
+        theta = np.where(passing | undetermined(theta, doubt, widths), theta, without)
     left = bench.difference(k, bench.read(k, problem.causes(f.members, theta, f.extra)))
     index = problem.member_columns(f.members)
     usual = estimate(total(f.grams), problem.prior, index, 1.0)[0]
@@ -75,6 +80,15 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
         left = left - problem.farther(f)[k] @ usual[pushed]
         usual[pushed] = 0.0
     return np.asarray(left - (problem.columns.blocks[k] @ usual).reshape(left.shape[1], -1).T)
+
+
+def undetermined(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
+    """Mask (d,) of coordinates theta that runs do not determine, given their deviations doubt (d,); a cause of `widths`
+    coordinates is masked as a whole.
+    """
+    faint, ends = doubt > UNDETERMINED * np.abs(theta), np.cumsum(widths)
+    each = [bool(faint[end - width : end].all()) for end, width in zip(ends, widths, strict=True)]
+    return np.repeat(each, widths).astype(bool)
 
 
 def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
