@@ -1,4 +1,4 @@
-"""Runs camcomp's command line and reads what it wrote."""
+"""Runs camcomp's command line and reads its output."""
 
 import csv
 import io

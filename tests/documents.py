@@ -22,7 +22,7 @@ _FENCE = re.compile(r"^```(\w*)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 @dataclass
 class Command:
-    """A command of a document, where it stands, what it promises."""
+    """A command of a document, with its line and the output that the document promises."""
 
     text: str
     line: int

@@ -1,4 +1,4 @@
-"""Runs `camcomp import` in this process and reads what it wrote."""
+"""Runs `camcomp import` in this process and reads its output."""
 
 from types import SimpleNamespace
 

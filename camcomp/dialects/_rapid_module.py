@@ -17,7 +17,6 @@ from camcomp.ground.orientation import rotations_of_quaternions
 COMPONENTS = ("X", "Y", "Z", "Q1", "Q2", "Q3", "Q4")
 MODULE = re.compile(r"\s*MODULE\s+\w+", re.IGNORECASE)
 FASTEST_ZONE_MM = {0: 0.3}  # z0; zN is a zone of N mm
-UNUSED = 9e9  # an external axis that is not there
 _NUMBER = re.compile(r"\s*([-+]?(?:\d{1,12}\.?\d*|\.\d+)(?:E[-+]?\d{1,2})?)\s*", re.IGNORECASE)
 _DECLARED = re.compile(
     r"\s*(?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+(\w+)\s+(\w+)\s*(?::=\s*(.*?))?\s*;\s*\Z", re.IGNORECASE

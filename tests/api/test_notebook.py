@@ -1,4 +1,4 @@
-"""The notebook of the samples runs from its first cell to its last, as Jupyter would run it, and shows what it says."""
+"""The notebook of the samples runs from its first cell to its last, as Jupyter would run it, and prints its stated figures."""
 
 import pytest
 

@@ -85,7 +85,7 @@ def test_a_cable_at_the_end_of_the_travel_is_no_push(tmp_path):
     ids=["a large difference", "a difference of twice the floor"],
 )
 def test_a_lag_that_differs_between_the_ways_is_unknown_beside_the_lag(tmp_path, seed):
-    """Nothing rubs there: a loop has no way that it likes better. By less than a hundredth of the lag, but twice the floor, too."""
+    """An axis without friction: a loop lags equally in both directions. By less than a hundredth of the lag, but twice the floor, too."""
     result, row = judged(tmp_path, seed)
     assert result["verdict"] == "unknown" and row["all"] and not row["false_cause"]
 
@@ -98,7 +98,7 @@ def test_a_lag_that_differs_between_the_ways_is_unknown_beside_the_lag(tmp_path,
 )
 def test_what_takes_a_part_of_something_unknown_is_not_sure(tmp_path, seed):
     """Friction that fades, of which a loop that swings over takes a third; an end stop that two pushes are made of; a drag of
-    which a loop that creeps takes some; play in the loop, told as friction that would push at speed.
+    which a loop that creeps takes some; play in the loop, reported as a friction force at speed.
     """
     result, row = judged(tmp_path, seed)
     assert result["verdict"] == "unknown" and not row["false_cause"]

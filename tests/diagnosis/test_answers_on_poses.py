@@ -17,7 +17,7 @@ def judged(folder, seed):
 
 
 def some(experiments, in_ci):
-    """Parameters of a test from experiments by the number of the generator; ids say what is the matter there."""
+    """Parameters of a test from experiments by the number of the generator; ids name the faults."""
     return [
         pytest.param(number, marks=() if number in in_ci else pytest.mark.campaign, id=what if isinstance(what, str) else what[-1])
         for number, what in experiments.items()
@@ -52,7 +52,7 @@ def test_a_beam_that_broke_at_one_of_28_poses_is_listed(tmp_path):
 
 @pytest.mark.campaign
 def test_of_one_campaign_nothing_is_more_than_even_beside_what_is_left(tmp_path):
-    """A joint that wobbles about another axis; geometries of three joints fit nearly alike."""
+    """A joint that wobbles about another axis; geometries of three joints fit almost equally well."""
     result, row = judged(tmp_path, 53002)
     assert result["verdict"] == "unknown" and not row["false_cause"]
     assert all(cause["probability"] <= 0.5 for cause in result["causes"] if cause["effect"] != "unknown")

@@ -23,13 +23,13 @@ def judged(folder, generator, seed):
 
 
 def test_a_log_with_empty_set_points_of_a_machine_with_nothing_wrong(tmp_path):
-    """At a corner the row without the set-point of x had its set-point of z, 0.38 mm beside what lies between its neighbours."""
+    """At a corner the row without the set-point of x had its set-point of z, 0.38 mm from the line between its neighbours."""
     result, _ = judged(tmp_path, "serial", 5008)
     assert (result["verdict"], result["causes"]) == ("none", [])
 
 
 def test_a_bending_tool_that_one_run_of_three_shows(tmp_path):
-    """The others are in the air and say nothing of it."""
+    """The other runs are in the air, where no force bends the tool."""
     result, row = judged(tmp_path, "serial", 11032)
     assert result["verdict"] == "identified" and row["held"] == [True]
     assert [each["effect"] for each in result["causes"]] == ["tool_deflection"]
@@ -52,7 +52,7 @@ def test_a_cause_that_leaves_the_gap_as_it_is_is_not_sure(tmp_path):
 
 @pytest.mark.campaign  # the longest of this file
 def test_lines_that_a_control_merges_are_no_gap(tmp_path):
-    """Tip alone, nothing wrong: LinuxCNC makes one line of several within 50 um in G64 P0.05."""
+    """A log of the tip on a machine without causes: LinuxCNC makes one line of several within 50 um in G64 P0.05."""
     with recording.taken_from("rosettes"):
         result, _ = judged(tmp_path, "parallel", 71020)
     assert (result["verdict"], result["causes"]) == ("none", [])
@@ -70,7 +70,7 @@ def test_what_is_far_behind_in_rapids_is_no_outlier(tmp_path):
 
 @pytest.mark.campaign
 def test_a_gap_that_is_not_above_the_floor_has_no_cause(tmp_path):
-    """A lag of all axes, tip alone, that left the gap as large as it was."""
+    """A lag of all axes in a log of the tip, which does not reduce the gap."""
     with recording.taken_from("rosettes"):
         result, _ = judged(tmp_path, "parallel", 71031)
     assert (result["verdict"], result["causes"]) == ("none", [])
@@ -86,7 +86,7 @@ def test_how_fast_a_tool_is_between_stops_rows_do_not_say(tmp_path):
 
 @pytest.mark.campaign
 def test_two_joints_that_do_the_same_have_the_same_minor_causes_beside_them(tmp_path):
-    """A shift of A4 was told as one of A1, sure, by friction elsewhere that was minor beside that set alone."""
+    """A shift of A4 does the same as one of A1; friction elsewhere is minor jointly with either."""
     result, row = judged(tmp_path, "serial", 49122)
     assert result["verdict"] == "ambiguous" and row["first_or_class"]
 

@@ -31,7 +31,7 @@ def test_the_play_that_the_tip_shows_is_no_part_of_what_rings_in_the_encoder(tmp
 
 @pytest.mark.campaign
 def test_a_soft_drive_stands_though_another_that_hardens_does_a_part_of_it(tmp_path):
-    """What a soft drive x would do instead of it is no prediction of what runs show that were not fitted."""
+    """A soft drive x instead of it predicts held-out runs badly."""
     known = ("drive_stiffness", "z")
     assert beside(tmp_path, 2091011, "puu", known, ("hardening", "x")) == {known}
 

@@ -21,7 +21,7 @@ def test_three_causes_that_one_unknown_effect_does_as_well_are_not_named(tmp_pat
 
 @pytest.mark.campaign
 def test_a_lag_that_any_function_of_velocity_draws_but_for_what_is_minor_is_the_lag(tmp_path):
-    """Such a family draws small things beside the lag as well: nothing unknown is claimed for less than is minor at the tip."""
+    """Such a family fits small deviations as well as the lag: those below MINOR at the tip are no unmodelled cause."""
     causes = (("servo_lag", None), ("gravity", None))
     result, _ = answer(Plan(1532000, "pair", causes, (3.0, 6.0), machine="router", runs=4, rows=300), tmp_path)
     assert result["verdict"] == "identified"
@@ -30,7 +30,7 @@ def test_a_lag_that_any_function_of_velocity_draws_but_for_what_is_minor_is_the_
 
 @pytest.mark.campaign
 def test_springs_of_several_joints_are_one_thing_that_gives_way(tmp_path):
-    """Whatever depends on the force does what they do together, and nothing unknown is needed for that."""
+    """Any law of the force does the same as these springs jointly, so no unmodelled cause is claimed."""
     result, _ = answer(Plan(1544004, "imperfect", imperfect=True, machine="kuka-kr210", **LONG), tmp_path)
     assert result["verdict"] != "unknown"
     assert {("drive_stiffness", "A3"), ("cutting_force", None)} <= {
@@ -54,7 +54,7 @@ def test_what_a_law_of_friction_says_wrongly_is_no_play_beside_it(tmp_path):
 
 @pytest.mark.campaign
 def test_a_lag_stands_beside_a_friction_whose_law_is_a_little_wrong(tmp_path):
-    """What depends on velocity draws the lag, and what the law of friction leaves as well."""
+    """A law of the velocity fits the lag and the residual of the law of friction."""
     causes = (("servo_lag", None), ("friction", "x"))
     result, _ = answer(Plan(1632000, "pair", causes, (3.0, 9.0), machine="router", **LONG), tmp_path)
     assert result["verdict"] == "identified"
@@ -86,7 +86,7 @@ def test_a_bump_of_a_guide_is_no_wave_with_a_pitch(tmp_path):
 @pytest.mark.campaign
 @pytest.mark.parametrize("seed", [1744002, 1744005, 1744007], ids=["one arm", "another arm", "a third arm"])
 def test_springs_some_per_cent_off_are_found_though_a_length_or_a_soft_tool_does_for_two_of_them(tmp_path, seed):
-    """Two of them are exchanged for one at once; what is no answer, because a member may be minor, speaks against others."""
+    """Two of them are exchanged for one at once; a set with a member that may be minor lowers the probability of others."""
     result, _ = answer(Plan(seed, "imperfect", imperfect=True, machine="kuka-kr210", **LONG), tmp_path)
     found = {(each["effect"], each["target"]): each["probability"] for each in result["causes"]}
     assert min(found["cutting_force", None], found["drive_stiffness", "A2"], found["drive_stiffness", "A3"]) > 0.5
@@ -123,7 +123,7 @@ def test_a_squareness_that_shows_where_the_tool_plunges_is_no_slip_of_the_clampi
 
 @pytest.mark.campaign
 def test_a_ringing_drive_is_no_loop_that_rings_half_as_much(tmp_path):
-    """Over eight rows it averages to nothing; row by row 37 of its 58 um are left."""
+    """Its mean over eight rows is zero; row by row the residual is 37 of its 58 um."""
     plan = Plan(1543009, "unknown", (("servo_resonance", "A2"),), (10.0,), machine="kuka-kr210", **LONG)
     result, _ = answer(plan, tmp_path)
     assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("unknown", ["unknown"])

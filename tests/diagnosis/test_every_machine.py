@@ -65,7 +65,7 @@ def test_every_effect_has_its_row():
 
 
 def test_every_shipped_machine_has_its_column():
-    """But the Orthoglide with rolled chains, which is the Orthoglide, and no-force, which is no machine."""
+    """Except the Orthoglide with rolled chains, which is the Orthoglide, and the configuration no-force."""
     shipped = {path.stem for path in (runner.ROOT / "config").glob("*.yaml")} - {"orthoglide-1deg", "no-force"}
     assert shipped == set(grid.MACHINES)
 

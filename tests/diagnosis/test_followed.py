@@ -53,7 +53,7 @@ def test_model_and_plant_are_at_the_same_place(name, path, cutting, tmp_path):
 
 @pytest.mark.parametrize(("path", "cutting"), [("circles-exact", True), ("zigzag-10um", False), ("zigzag-10um", True)])
 def test_minutes_of_cutting_are_those_of_the_plant(path, cutting, tmp_path):
-    """A run in the air wears no tool, and rapids that were not logged neither."""
+    """Runs in the air and rapids outside of the log wear no tool."""
     machine, run = MACHINES["orthoglide"], Run(recording.load(path), cutting, 100.0)
     t = row_times(run, Plan(0, rows=200), False, np.random.default_rng(1))
     opened = logged(tmp_path, machine, run, observe(machine, run, Faults(), Character(), t))

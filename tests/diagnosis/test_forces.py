@@ -1,5 +1,5 @@
-"""The force that a diagnosis takes for the cutting force of a log, beside the one of the plant; and what is allowed where it
-is in doubt."""
+"""The cutting force that a diagnosis assumes for a log, compared with the plant's, and the answers allowed where it is in
+doubt."""
 
 from types import SimpleNamespace
 

@@ -86,7 +86,7 @@ def corrected(lathe, program, *options):
 
 
 def in_four_digits(formula):
-    """A formula as it is told to people."""
+    """A formula as it is reported."""
     return re.sub(r"\d+\.\d{3,}", lambda number: f"{float(number[0]):.4g}", formula)
 
 
@@ -120,7 +120,7 @@ def test_compensated_with_the_law_the_machine_cuts_true_at_once(lathe):
 
 
 def cuts_needed(lathe, program, logs):
-    """How many test cuts the mirror technique needs for a program, beside logs that are there: each adds its own."""
+    """How many test cuts the mirror technique needs for a program in addition to existing logs: each adds its own."""
     plain, count = ["--config", lathe.made.machine.config], 0
     while True:
         now = corrected(lathe, program, *plain, *(o for log in logs for o in ("--mirror", log))) if logs else program

@@ -76,7 +76,7 @@ def test_linuxcnc_reads_them(proposals):
 
 
 def test_in_the_air_nothing_is_met_that_the_runs_did_not_pass(bench, every):
-    """No design without cutting goes below where a run went without cutting; what cuts stays where the runs cut."""
+    """Designs in the air stay above the lowest run in the air; designs that cut stay where the runs cut."""
     runs = dict(zip(("cut", "air"), bench.runs, strict=True))
     lowest = commanded(bench, runs["air"])[:, 2].min()
     been = commanded(bench, runs["cut"])

@@ -1,4 +1,4 @@
-"""What every healthy guide has of friction bends a drive farther that is softer than stated."""
+"""The friction of every healthy guide bends a drive farther that is softer than stated."""
 
 import numpy as np
 import pytest

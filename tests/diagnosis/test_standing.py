@@ -25,7 +25,7 @@ ROWS = 15  # inserted, 0.04 s each
 
 @pytest.fixture
 def stood(tmp_path):
-    """Log of two circles with ROWS of rest between them in which no drive bears a force; first of these rows."""
+    """Log of two circles with ROWS at standstill between them in which no drive bears a force; first of these rows."""
     (tmp_path / "p.nc").write_text(PROGRAM)
     config = ROOT / "config/cartesian.yaml"
     words = [

@@ -47,7 +47,7 @@ def test_after_an_unknown_effect_one_thing_is_changed_and_the_rest_left(workshop
 
 @pytest.mark.campaign
 def test_members_that_undo_each_other_explain_nothing(workshop):
-    """Soft links tilt the platform; beside each other, a longer tool and a lower workpiece do so with any lever."""
+    """Soft links tilt the platform; jointly, a longer tool and a lower workpiece do so with any lever."""
     plan = Plan(81015, (Cause("link_stiffness", None, 88934),), (10.0,), world=8)
     result = diagnose(workshop.made(plan)[0], without=("link_stiffness",)).result.as_json()
     assert result["verdict"] == "unknown"

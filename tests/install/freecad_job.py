@@ -52,7 +52,7 @@ def change_stock(job, kind):
 
 
 def main():
-    """Posts what the file says."""
+    """Posts the job of the file."""
     with open(os.environ["JOB"], encoding="utf-8") as file:
         task = json.load(file)
     job = posted_job()

@@ -30,7 +30,7 @@ class Cartesian(machines.Serial):
 
 
 class Ur10(machines.Kuka):
-    """Six rigid joints that carry weights; the flange is the tip, and nothing cuts."""
+    """Six rigid joints that carry weights; the flange is the tip, without a cutting force."""
 
     name = "ur10"
     actuators = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")

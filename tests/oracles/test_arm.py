@@ -100,7 +100,7 @@ def test_work_of_the_drives_round_a_loop_is_zero(job):
 
 
 def periodic_slope(values):
-    """Derivative by the angle of one period (end point repeated), exact for what the points resolve."""
+    """Derivative by the angle of one period (end point repeated), exact for harmonics that the points resolve."""
     coefficients = np.fft.rfft(values[:-1])
     slope = np.fft.irfft(1j * np.arange(len(coefficients)) * coefficients, len(values) - 1)
     return np.append(slope, slope[0])

@@ -144,7 +144,7 @@ def laps_of(path):
 
 
 def in_the_corner(free):
-    """How far (n,) mm from the last corner nothing stands, on rays into it."""
+    """Distance (n,) mm from the last corner to the material, on rays into it."""
     turn = np.radians(np.arange(-85.0, 0.0, 10.0))
     rays = np.column_stack((np.cos(turn), np.sin(turn)))
     low, high = np.full(len(rays), 0.8 * R), np.full(len(rays), 1.5 * R)
@@ -159,7 +159,7 @@ def in_the_corner(free):
 def test_a_corner_is_reached_over_a_line_shorter_than_the_way_on_which_the_bend_changes(
     tmp_path, monkeypatch, spring, corrected, within
 ):
-    """The tip goes along it; by the plant the corrected program leaves nothing standing in the corner."""
+    """The tip goes along it; by the plant the corrected program clears the corner."""
     monkeypatch.setattr(sys.modules[__name__], "SPRING", spring)
     (tmp_path / "soft.yaml").write_text(CONFIG.replace("400.0", str(spring)))
     job = Job(load_config([shipped("config/cartesian.yaml"), tmp_path / "soft.yaml"]))

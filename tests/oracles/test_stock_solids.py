@@ -68,7 +68,7 @@ def radius_of(kind, lift):
 
 
 def wanted_arcs(block, kind, tip, way, lift, count=1440):
-    """Arcs on the front half, where the tool's surface moves towards what stands, that meet material.
+    """Arcs on the front half, where the tool's surface moves towards the material, that meet it.
 
     Widths (rad) of the arcs, and of the gaps between them.
     """

@@ -1,4 +1,4 @@
-"""The hooks and the workflow that are offered to users do what they say."""
+"""The hooks and the workflow that are offered to users work as described."""
 
 import os
 import re

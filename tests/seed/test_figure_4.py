@@ -1,4 +1,4 @@
-"""What the compensation paper says of its Fig. 4: a circle of radius 1 mm near Q1."""
+"""The compensation paper's figures for its Fig. 4: a circle of radius 1 mm near Q1."""
 
 import numpy as np
 import pytest

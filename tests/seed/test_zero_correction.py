@@ -1,4 +1,4 @@
-"""A program without deflection is not changed: same bytes, arcs stay arcs."""
+"""A program without deflection keeps its bytes: arcs stay arcs."""
 
 import pytest
 

@@ -103,13 +103,13 @@ def of_changed_data(row: Row) -> Iterator[tuple[str, bool]]:
 
 
 def of_left_out_run(row: Row) -> Iterator[tuple[str, bool]]:
-    """The same of a run that was left out: does the predicted shrinkage hold on it?"""
+    """The same of a held-out run: does the predicted shrinkage hold on it?"""
     if "ratio" in row:
         yield "95 % interval of the shrinkage holds on a further run", row["low"] <= row["ratio"] <= row["high"]
 
 
 def add(result: Row, seed: int, outcomes: list[tuple[str, bool]], rows: list[Row]) -> None:
-    """Add one experiment to a result, with the probabilities of its causes and what was wrong."""
+    """Add one experiment to a result, with the probabilities of its causes and its wrong claims."""
     counts = result.setdefault("counts", {})
     for name, hit in outcomes:
         count = counts.setdefault(name, [0, 0])

@@ -129,7 +129,7 @@ def orthoglide(seed: int) -> list[Row]:
 
 
 def hidden_laws(seed: int) -> list[Row]:
-    """Laws and nothing in turn, on three machines, at 10 and 3 x noise."""
+    """Experiments with a law and without one in turn, on three machines, at 10 and 3 x noise."""
     from tests.validation.recorded import hidden_laws as laws
 
     names = [*laws.TRUTH, "null"]
@@ -155,7 +155,7 @@ def changed_data(seed: int) -> list[Row]:
 
 
 def left_out_runs(seed: int) -> list[Row]:
-    """Every run of an experiment with causes, on five machines in turn, left out once."""
+    """Every run of an experiment with causes, on five machines in turn, held out once."""
     from tests.validation.recorded.__main__ import mixed
     from tests.validation.recorded.experiment import make, write
     from tests.validation.recorded.left_out_runs import runs_left_out
@@ -237,7 +237,7 @@ GENERATORS = {
 
 
 def seed_rows(name: str, seed: int) -> tuple[int, Outcomes, list[Row]]:
-    """What a worker runs."""
+    """One seed of a generator, as a worker runs it."""
     return GENERATORS[name].run(seed)
 
 

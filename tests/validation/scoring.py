@@ -82,7 +82,7 @@ def _by_its_name(cause: Row, known: set[str]) -> Row:
 
 
 def judge(result: Row, truth: Row, known: set[str]) -> Row:
-    """What was right; keys that do not apply are missing."""
+    """Correct claims by key; keys that do not apply are missing."""
     hidden = OF_CONTROL if truth["channels"] in WITHOUT_SETPOINTS else ()
     real = [_by_its_name(c, known) for c in truth["causes"] if c["ratio"] >= NAMED]
     real = [c for c in real if c["effect"] not in hidden]
@@ -142,7 +142,7 @@ def judge(result: Row, truth: Row, known: set[str]) -> Row:
 
 
 def may_be_named(truth: Row) -> set[Pair]:
-    """What does the same as the true causes within the noise, where a truth says so."""
+    """Causes that the truth lists as equal to the true ones within the noise."""
     out = {(effect, target) for effect, target in truth.get("may_be_named", [])}
     for one in (truth.get("allowed_beside", []), *truth.get("allowed_sets", [])):
         out |= _pairs(one)
@@ -220,12 +220,12 @@ def wilson(hits: int, total: int, z: float = 1.96) -> tuple[float, float]:
 
 
 def all_due(row: Row) -> bool:
-    """Whether all that has to be named is; nothing has to be where everything is small."""
+    """Whether all due causes are named; none are due where all are small."""
     return bool(row["all"]) if row["due"] else not row["unknown"]
 
 
 def right(row: Row) -> bool:
-    """Whether an answer is the one that its kind asks for, with nothing false beside it."""
+    """Whether an answer is the one that its kind asks for, without a false claim."""
     if "failed" in row or row["false_cause"] or row["unknown"] != bool(row["foreign"]):
         return False
     if row["foreign"]:

@@ -1,4 +1,4 @@
-"""The pages say what the stored results say; results add up, go on where they stopped, and take seeds that are free."""
+"""The pages state the stored results; results add up, go on where they stopped, and take seeds that are free."""
 
 import json
 from pathlib import Path

@@ -37,7 +37,7 @@ TOLD = 0.35  # of the noise: above it an honest judge may call a rest unknown
 
 
 class AgainError(Exception):
-    """What was drawn makes no sense; draw again."""
+    """The drawn experiment is impossible; draw again."""
 
 
 @dataclass
@@ -114,7 +114,7 @@ class Scene:
         return np.concatenate(out)
 
     def difference(self, axis: Driven, one: list, other: list, channel: str) -> float:
-        """Rms of what one does more than the other, over all rows of the log, over the channel's noise."""
+        """Rms difference of two channels over all rows of the log, divided by the channel's noise."""
         unit = self.s.whole_N if channel == "force" else self.s.whole_mm
         change = self.at_rows(axis, one, channel) - self.at_rows(axis, other, channel)
         share = len(change) / sum(map(len, self.rows))
@@ -336,7 +336,7 @@ def causes(kind: str, turn: int, scene: Scene, rng: np.random.Generator) -> list
 
 
 def small(scene: Scene, taken: set, rng: np.random.Generator) -> list[dict]:
-    """Small errors of everything that nothing large is at."""
+    """Small errors of every part without a large one."""
     out = []
     for one in scene.axes:
         speed, change = moves(one, scene)
@@ -536,7 +536,7 @@ def allowed(
 
 
 def make(seed: int, out: Path, only: str | None = None) -> None:
-    """Writes experiment e-<seed> and its truth; draws again, in a fixed order, what makes no sense."""
+    """Writes experiment e-<seed> and its truth; redraws impossible experiments in a fixed order."""
     for attempt in range(60):
         try:
             return attempt_one(seed, attempt, out, only)

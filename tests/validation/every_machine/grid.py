@@ -104,7 +104,7 @@ ELSEWHERE = {
 
 
 def same_as(machine: str, fault: Fault) -> Fault:
-    """The name under which runs of programs have an effect of arms that does there exactly what another one does."""
+    """Name of the effect of programs that is identical with this effect of arms."""
     if fault.effect == "gravity_compliance":  # in series with the joint's spring
         (more,) = fault.parameters.values()
         config = yaml.safe_load((runner.ROOT / "config" / f"{machine}.yaml").read_text())

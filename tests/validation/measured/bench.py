@@ -31,7 +31,7 @@ Opponents = dict[str, Callable[[], np.ndarray]]
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is judged: columns of the residuals, the nominal residual, and the opponents'; (n,) or (n, 3) in mm, rad or N."""
+    """A quantity that is compared: columns of the residuals, the nominal residual, and the opponents'; (n,) or (n, 3) in mm, rad or N."""
 
     name: str
     channels: tuple[str, ...]
@@ -130,7 +130,7 @@ def _left_by(folder: Path, written: Path, content: dict[str, Any], judged: str) 
 
 
 def _claim(result: dict[str, Any], q: Quantity) -> float | None:
-    """What the answer says that is left on the judged run, in the quantity's unit."""
+    """Residual on the held-out run that the answer predicts, in the quantity's unit."""
     shrunk = result.get("shrinkage") or {}
     if q.channels == ("x_mm", "y_mm", "z_mm"):
         return 1e-3 * q.scale * shrunk["after_rms_um"] if shrunk else None

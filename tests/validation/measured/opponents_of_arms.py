@@ -91,7 +91,7 @@ def _torques(arm: Arm, q: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What is fitted: links, compliances and harmonics of an arm, and the frames of the campaign that was fitted."""
+    """Fitted parameters: links, compliances and harmonics of an arm, and the frames of the campaign that was fitted."""
 
     arm: Arm
     compliance: bool = False

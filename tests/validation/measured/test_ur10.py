@@ -62,7 +62,7 @@ def seen_at(curve):
 
 @pytest.fixture(scope="module")
 def sample():
-    """The sample's diagnosis; what the command prints of it the README's test looks at."""
+    """The sample's diagnosis; the README's test compares the output of its command."""
     return camcomp.diagnose(ROOT / "samples/ur10/experiment.yaml")
 
 

@@ -49,7 +49,7 @@ def at_rows(values: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 def simulate(machine: Machine, tracks: list[Track], rows: list[np.ndarray], deviations: list[Deviation],
              strange=None, scatter: np.ndarray | None = None, drives: bool = False) -> Seen:  # fmt: skip
-    """What the plant does at the times `rows` (s, per track); strange: a fault of `strange.py`; scatter: (2, c)."""
+    """States of the plant at the times `rows` (s, per track); strange: a fault of `strange.py`; scatter: (2, c)."""
     chains = len(machine.drives)
     springs = structure.nominal(chains)
     if scatter is not None:

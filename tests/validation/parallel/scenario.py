@@ -222,7 +222,7 @@ def small_errors(draw: Draw, without: set[tuple[str, str | None]]) -> tuple[list
 
 
 def left_over(draw: Draw, change: np.ndarray) -> float:
-    """rms (mm) of what a least-squares fit of all library effects leaves of a tip change on the thinned rows.
+    """Rms (mm) of the residual of a tip change on the thinned rows after a least-squares fit of all library effects.
 
     Also in the fit, beyond the effects drawn here: squareness, linear axis errors, and screws of many pitches.
     """
@@ -276,7 +276,7 @@ def cause_entry(draw: Draw, one: Deviation) -> dict:
 
 
 def fill(rng: np.random.Generator, s: Scenario) -> None:
-    """Draws what is wrong, by the scenario's kind."""
+    """Draws the faults, by the scenario's kind."""
     draw, without = Draw(rng, s), set()
     if s.kind in ("single", "pair"):
         for _ in range(2 if s.kind == "pair" else 1):

@@ -12,7 +12,7 @@ SPINDLE_HZ = 8000 / 60  # every recorded program says S8000
 
 
 def draw(rng: np.random.Generator, mess: str | None) -> dict:
-    """Instruments of one experiment; `stated` is what the experiment file says of them."""
+    """Instruments of one experiment; `stated` are their values in the experiment file."""
     white = float(rng.uniform(1.5, 6.0)) * 1e-3
     stated = bool(mess == "drift" or rng.random() < 0.35)
     slow = float(rng.uniform(0.2, 0.5)) * white if stated else float(rng.uniform(0.2, 0.9)) * 1e-3
@@ -48,7 +48,7 @@ def slow_noise(rng: np.random.Generator, times: np.ndarray, spread: float, memor
 
 
 def logs(rng: np.random.Generator, s: Scenario) -> tuple[list[str], float]:
-    """One CSV text per run, and the rms 3-D of the tip noise that was added (mm, spikes left out)."""
+    """One CSV text per run, and the rms 3-D of the tip noise that was added (mm, without spikes)."""
     seen = simulate(s.machine, s.tracks, s.rows, [*s.causes, *s.small], s.fault, s.scatter, drives=True)
     texts, squares, count, begin = [], 0.0, 0, 0
     shift = int(rng.choice([-4, -3, -2, -1, 1, 2, 3, 4])) if s.mess == "line_shift" else 0

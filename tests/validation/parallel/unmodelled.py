@@ -38,7 +38,7 @@ class Strange:
         return out
 
     def at(self, machine: Machine, run: Track) -> dict:
-        """What the fault adds at 1 kHz: control, carriage (n, c), side (n, c, 3), force, tip (n, 3)."""
+        """Deviations by the fault at 1 kHz: control, carriage (n, c), side (n, c, 3), force, tip (n, 3)."""
         key = (self.name, self.drive, repr(self.constants))
         if run.cache.get("key") != key:
             run.cache.update(key=key, unit=self._unit(machine, run))

@@ -63,7 +63,7 @@ class Plan:
 
 
 def small_errors(rng: np.random.Generator, scale: float) -> Truth:
-    """A machine with nothing wrong but the small errors that every machine has (together below the tip's noise)."""
+    """A machine with the small errors that every machine has (together below the tip's noise)."""
 
     def three(size: float) -> np.ndarray:
         return scale * size * rng.normal(size=3)
@@ -152,7 +152,7 @@ def severity(a: list[State], b: list[State], noise: Noise, channels: tuple[str, 
 
 
 def size(plan_: Plan, runs: list[Run], base: Truth, cause: Cause, ratio: float) -> float:
-    """Amplitude at which the cause, put into `base`, reaches the ratio; clipped to what is physical."""
+    """Amplitude at which the cause, put into `base`, reaches the ratio; clipped to physical values."""
     times = [even(r, 60) for r in runs]
     before = observe_all(runs, base, times)
     span = middle(runs)
@@ -172,7 +172,7 @@ def size(plan_: Plan, runs: list[Run], base: Truth, cause: Cause, ratio: float) 
 
 
 def executed(plan_: Plan) -> tuple[list[Planned], list[Run]]:
-    """What a plan executes, before anything is wrong with it."""
+    """The motion that a plan executes without faults."""
     rng = np.random.default_rng([plan_.seed if plan_.world is None else plan_.world, 5])
     planned = plan(plan_.design, rng)
     return planned, schedule(planned, rng)

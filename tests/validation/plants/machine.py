@@ -38,7 +38,7 @@ def _zeros() -> np.ndarray:
 
 @dataclass(frozen=True)
 class Truth:
-    """What is wrong with the machine; arrays are per actuator x, y, z.  The default is the perfect machine."""
+    """Faults of the machine; arrays are per actuator x, y, z.  The default is the perfect machine."""
 
     lag_ms: np.ndarray = field(default_factory=_zeros)
     play_mm: np.ndarray = field(default_factory=_zeros)
@@ -97,7 +97,7 @@ class Run:
 
 @dataclass
 class State:
-    """Everything known about one run at the times t (controller clock); foreign effects may change what is marked *."""
+    """Everything known about one run at the times t (controller clock); foreign effects may change fields marked *."""
 
     t: np.ndarray
     common: np.ndarray  # t on the common clock, s

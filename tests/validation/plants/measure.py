@@ -1,4 +1,4 @@
-"""How far the tip of the truth plant cuts beside the programmed path."""
+"""Distance of the truth plant's cuts from the programmed path."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ JOINING = 1.0  # mm beside the end of a move: joining lines lead from one cuttin
 
 
 def misses(state: State, program: str) -> np.ndarray:
-    """Distances (n,) mm of the cut tips from the path of `program`; those beside the ends of its moves are left out."""
+    """Distances (n,) mm of the cut tips from the path of `program`; without those near the ends of its moves."""
     line = Timeline(read(program))
     dense = line.sample(np.linspace(0.0, line.log_end, 20_000))
     step = np.linalg.norm(np.diff(dense["tip"], axis=0), axis=1).max()

@@ -17,7 +17,7 @@ TIP_MM, ENCODER_MM, FORCE_N, HEAT_K = 0.003, 0.0005, 1.0, 0.05
 
 @dataclass
 class Axes:
-    """What a run shows at times (n,) s of the common clock, every GRID_S: encoders, tips (n, 3) mm, drives (n, 3) N, heat (n,) deg C."""
+    """Channels of a run at times (n,) s of the common clock, every GRID_S: encoders, tips (n, 3) mm, drives (n, 3) N, heat (n,) deg C."""
 
     encoder: np.ndarray
     tip: np.ndarray

@@ -212,7 +212,7 @@ def write_log(path: Path, columns: dict[str, tuple[np.ndarray, str]], empty: np.
 
 
 def make(seed: int, out: Path, only: str | None) -> None:
-    """Writes experiment e-<seed> and its truth; draws again, in a fixed order, what makes no sense."""
+    """Writes experiment e-<seed> and its truth; redraws impossible experiments in a fixed order."""
     for attempt in range(25):
         try:
             return attempt_one(seed, np.random.default_rng([seed, attempt, 6007]), out, only)

@@ -12,7 +12,7 @@ WAYS = ("joints", "narrow", "grid", "sphere", "swings")
 
 
 class AgainError(Exception):
-    """What was drawn makes no sense; draw again."""
+    """The drawn experiment is impossible; draw again."""
 
 
 @dataclass

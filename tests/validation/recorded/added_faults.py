@@ -28,7 +28,7 @@ def fault(effect: str, target: str, size: float, seed: int, span_s: tuple[float,
 
 
 def at_encoder(fault: Fault, i: int, setpoint: np.ndarray) -> np.ndarray:
-    """What a loop adds to the encoder (n,) of actuator i on the grid of 1 ms."""
+    """Change by a loop of the encoder (n,) of actuator i on the grid of 1 ms."""
     if fault.effect != "ringing_loop":
         return np.zeros(len(setpoint))
     w, d = 2e3 * np.pi / fault.parameters["period_ms"], fault.parameters["damping"]

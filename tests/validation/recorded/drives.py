@@ -1,4 +1,4 @@
-"""What lies between set-point and carriage, in time, on the recordings' grid of 1 ms: servo, friction, heat.
+"""Dynamics between set-point and carriage on the recordings' grid of 1 ms: servo, friction, heat.
 
 Play is `tests.validation.plants.drives.play`.  None of these formulas is the fit model's: two loops in cascade where a fit has one, LuGre's
 bristles with Stribeck's bump where a fit has a Coulomb step that turns round, a warming of two parts where it has one.

@@ -191,7 +191,7 @@ def sensitivity(machine: str) -> dict[tuple[str, Target], float]:
 
 
 def unabsorbed(bench: Bench, machine: str, base: tuple[Fault, ...], fault: Fault, sensors: Sensors) -> float:
-    """Tip rms (mm) that is left of a fault when every effect of the library, to first order, takes what it can."""
+    """Rms (mm) at the tip of the residual of a fault after a first-order fit of every effect of the library."""
 
     def readings(states: list[State]) -> np.ndarray:
         tip = np.concatenate([s.tip[s.steady] / sensors.tip_mm for s in states])
@@ -315,7 +315,7 @@ def write(made: Made, plan: Plan, folder: Path) -> Path:
 
 
 def truth_json(made: Made) -> str:
-    """The sealed answer, with what the library leaves of strange causes: as much work as all the rest of an experiment."""
+    """The sealed answer, with the residual of unmodelled causes after a fit of the library: half of an experiment's work."""
     for place, left in made.left.items():
         made.record["causes"][place]["left_ratio"] = 1e3 * left() / made.record["noise_um"]
     return json.dumps(made.record, indent=1)

@@ -1,4 +1,4 @@
-"""What is wrong with a machine: faults by the names of the contract's library, and how their sizes are drawn."""
+"""Faults of a machine, by the names of the contract's library, and how their sizes are drawn."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ PLANES = ("xy", "xz", "yz")
 
 
 def targets(effect: str, actuators: tuple[str, ...]) -> list[Target]:
-    """What an effect may be about."""
+    """Targets that an effect may have."""
     kind = LIBRARY[effect]
     own = PLANES if effect == "squareness" else actuators
     return ([None] if kind.common else []) + (list(own) if kind.own else [])
@@ -103,7 +103,7 @@ def every(machine: Machine) -> list[tuple[str, Target]]:
 
 
 def sized(effect: str, target: Target, size: float, seed: int, reach: float | None = None) -> Fault:
-    """The fault of that size (a share for factors); what it has beside its size is drawn from the seed.
+    """The fault of that size (a share for factors); its other parameters are drawn from the seed.
 
     reach: of rotary joints, mm per rad, whose offset is given in rad.
     """

@@ -50,7 +50,7 @@ def _pull(s: State, axis: int) -> np.ndarray:
 
 
 def _tangle(s: State, axis: int) -> np.ndarray:
-    """What no form of the search can express."""
+    """A function of s that no form of the search can express."""
     x, y = s.commanded[:, 0], s.commanded[:, 1]
     return np.sin((x + 0.6 * y) / 6.0) * np.tanh((y - 0.4 * x) / 8.0)
 
@@ -135,7 +135,7 @@ class Experiment:
         return out
 
     def write(self, folder: Path) -> list[np.ndarray]:
-        """The experiment as a user would hand it in; what the law does to the tip (n, 3) mm at every row."""
+        """The experiment as a user would hand it in; the law's deviation of the tip (n, 3) mm at every row."""
         states, plain = self.see(self.size, self.times), self.see(0.0, self.times)
         write(Made(self.runs, states, {"runs": [{} for _ in self.runs]}), self.plan, folder)
         return [a.tip - b.tip for a, b in zip(states, plain, strict=True)]
@@ -177,7 +177,7 @@ def judged(effect: str, target: str, machine: str, seed: int, ratio: float, fold
 
 
 def at_rows(own: np.ndarray, times: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Those rows (n, 3) of what was made at `times` that were kept."""
+    """The kept rows (n, 3) of values at `times`."""
     return own[np.abs(times[:, None] - kept).argmin(axis=0)]
 
 

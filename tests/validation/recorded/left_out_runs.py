@@ -1,4 +1,4 @@
-"""Whether the interval of the shrinkage holds what one more run shows: every run is left out once, causes and all.
+"""Whether the interval of the shrinkage contains that of one more run: every run is held out once, with its causes.
 
 The interval is of an experiment that never had the run, what it has to hold of the same experiment with the run named as `holdout`.
 """
@@ -32,7 +32,7 @@ def runs_left_out(folder: Path) -> list[Row]:
 
 
 def _asked(folder: Path, experiment: dict[str, Any]) -> Row:
-    """The answer to an experiment that has the files of a folder; nothing of it stays there."""
+    """The answer to an experiment with the files of a folder, which stays as it is."""
     path = folder / "left-out.yaml"
     path.write_text(yaml.safe_dump(experiment))
     try:

@@ -24,7 +24,7 @@ GROOVE = np.array([215.0, -10.0, -25.0])
 
 
 class Machine(Protocol):
-    """What the head of this file says."""
+    """One of the machines that the head of this file describes."""
 
     name: str
     config: Path

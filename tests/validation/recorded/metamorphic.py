@@ -244,7 +244,7 @@ def surer(before: dict[str, Any], after: dict[str, Any]) -> bool:
 
 
 def differences(before: dict[str, Any], after: dict[str, Any], names: Names, turned: bool = False) -> list[str]:
-    """What changed though nothing was to; turned: values in the program frame are not compared."""
+    """Values that changed where they have to stay; turned: values in the program frame are not compared."""
     out = []
     if before["verdict"] != after["verdict"]:
         out.append(f"verdict {before['verdict']} -> {after['verdict']}")

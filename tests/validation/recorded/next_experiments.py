@@ -1,4 +1,4 @@
-"""Is the next experiment well designed? What designs really tell, on the truth plant, beside random ones and a fine grid of them.
+"""Is the next experiment well designed? The information of designs on the truth plant, compared with random ones and a fine grid.
 
 A question is one of two causes that runs could not tell apart well. On the plant (tests.validation.plants.machine: it shares neither model nor
 linearisation with camcomp) both are put into one machine, the second as large as it has to be to look like the first on the runs.
@@ -50,7 +50,7 @@ QUESTIONS = (
 
 @dataclass(frozen=True)
 class World:
-    """A machine that ran a plan, and what it would be like with either of two causes."""
+    """A machine that ran a plan, and its states with either of two causes."""
 
     plan: Plan
     other: Cause
@@ -199,7 +199,7 @@ def every_design(desk: Desk, steps: int) -> list[MotionDesign]:
 
 
 def allowed(desk: Desk, design: MotionDesign) -> bool:
-    """Whether the machine can do it, and nothing stands in the way."""
+    """Whether the machine can run it without a collision."""
     return desk.within(design) and (design.cutting or design.points()[:, 2].min() >= desk.site.low - 0.05)
 
 

@@ -39,7 +39,7 @@ STRIBECK_MM_PER_S = 1.0
 
 @dataclass(frozen=True)
 class Character:
-    """What a machine is like without anything being wrong."""
+    """Properties of a machine without faults."""
 
     speed_loop: float = 0.15  # time constant of the speed loop over that of the position loop
     presliding_mm: float = 0.008

@@ -96,7 +96,7 @@ def _stated(folder: Path, machine: str, runs: list[dict[str, Any]]) -> Path:
 
 
 def answer(experiment: Path, folder: Path) -> str:
-    """What an answer comes to: verdict and causes; its file stands in the folder."""
+    """Verdict and causes of an answer; its file lies in the folder."""
     from camcomp.terminal.cli import run as camcomp
 
     file = folder / "result.json"

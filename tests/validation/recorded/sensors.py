@@ -1,4 +1,4 @@
-"""What the instruments make of a run: noise, drift, rounding, lost rows, and the columns that a control chose to log."""
+"""Errors of the instruments: noise, drift, rounding, lost rows, and the columns that a control chose to log."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CHANNELS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Sensors:
-    """Sizes of what the instruments add, one standard deviation per axis unless said otherwise.
+    """Sizes of the errors of the instruments, one standard deviation per axis unless said otherwise.
 
     The tip's deviation is divided, by variance, into white noise, slow noise (memory slow_s) and drift over the run.
     """
@@ -93,7 +93,7 @@ class Log:
 
 
 def table(state: State, sensors: Sensors, channels: str, machine: Machine, rng: np.random.Generator) -> Log:
-    """What is logged of a run."""
+    """The log of a run."""
     n, m = state.setpoint.shape
     encoder = state.encoder + rng.normal(0, 1, (n, m)) * sensors.encoder_mm / machine.reach
     step = sensors.encoder_step_mm / machine.reach

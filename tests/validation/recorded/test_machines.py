@@ -104,7 +104,7 @@ def test_the_chip_follows_the_speed():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_recorded_programs_fit(name):
-    """Where springs are stiff and nothing weighs, a machine in the air is where it is commanded."""
+    """Where springs are stiff and bodies have no mass, a machine in the air is where it is commanded."""
     machine, record = MACHINES[name], recording.load("override-blended")
     stiff = Faults([Fault(e, None, {"factor": 1e9}) for e in ("drive_stiffness", "link_stiffness")])
     t = record.t[np.linspace(5, len(record.t) - 6, 8).astype(int)]

@@ -1,4 +1,4 @@
-"""The designed next experiment tells as much on the truth plant as the best of a grid, and far more than designs by chance.
+"""The designed next experiment has as much information on the truth plant as the best of a grid, and far more than random ones.
 
 `python -m tests.validation.recorded.next_experiments` asks more questions, of a finer grid.
 """

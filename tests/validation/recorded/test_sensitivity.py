@@ -1,4 +1,4 @@
-"""The bench that halves and doubles constants tells one that decides from one that does not."""
+"""The bench that halves and doubles constants separates those that decide from the others."""
 
 import pytest
 

@@ -51,7 +51,7 @@ def strange(effect: str, target: str, size: float, seed: int, span_s: tuple[floa
 
 
 def at_encoder(fault: Fault, i: int, setpoint: np.ndarray) -> np.ndarray:
-    """What is added to the encoder (n,) of actuator i on the grid of 1 ms."""
+    """Addition to the encoder (n,) of actuator i on the grid of 1 ms."""
     if fault.effect != "servo_resonance":
         return np.zeros(len(setpoint))
     value, damping = fault.parameters, 0.06  # a soft coupling in the loop rings at every change of acceleration
@@ -61,7 +61,7 @@ def at_encoder(fault: Fault, i: int, setpoint: np.ndarray) -> np.ndarray:
 
 
 def at_carriage(fault: Fault, i: int, s: State) -> np.ndarray:
-    """What is added to the carriage (n,) of actuator i, mm or rad."""
+    """Addition to the carriage (n,) of actuator i, mm or rad."""
     value, size, load = fault.parameters, fault.parameters["size"], s.load / s.reach
     return _at_carriage(fault.effect, value, size, (s.setpoint[:, i] - s.middle[i]) * s.reach, i, load, s) / s.reach
 
@@ -83,7 +83,7 @@ def _at_carriage(
 
 
 def at_tip(fault: Fault, s: State) -> np.ndarray:
-    """What is added to the tip (n, 3), mm, program frame."""
+    """Addition to the tip (n, 3), mm, program frame."""
     value, size, out = fault.parameters, fault.parameters["size"], np.zeros((len(s.t), 3))
     if fault.effect in ON_ACTUATORS:
         return out

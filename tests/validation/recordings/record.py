@@ -106,7 +106,7 @@ def write_machine(folder: Path) -> None:
 
 
 def run(folder: Path, jobs: list[dict]) -> str:
-    """Runs the jobs in a LinuxCNC that is alone in its name spaces; what it printed."""
+    """Runs the jobs in a LinuxCNC that is alone in its name spaces, and returns its output."""
     (folder / "jobs.json").write_text(json.dumps(jobs))
     for path in (folder, *folder.iterdir()):  # LinuxCNC does not want to run as root
         path.chmod(0o777)

@@ -164,7 +164,7 @@ class Local:
         return self.plant.tips(item.put(self.plant, self.off, item.unit if amount is None else amount)) - self.base
 
     def quick(self, item: Item) -> np.ndarray:
-        """Tip change by an effect at its unit; what acts by one carriage only goes the short way."""
+        """Tip change by an effect at its unit; effects of one carriage are computed by its column."""
         machine, unit = self.plant.machine, item.unit
         if item.target not in machine.names:
             return self.of(item)
@@ -237,7 +237,7 @@ class Local:
 
 
 def remains(span: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """What a least-squares fit of the span leaves of a tip change (n, 3).
+    """Residual of a tip change (n, 3) after a least-squares fit of the span.
 
     Columns have the length one; sums of them that all but cancel would need errors of millimetres, and are left out.
     """

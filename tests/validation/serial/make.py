@@ -1,4 +1,4 @@
-"""Draws an experiment from a seed, runs it through the plant and its sensors, and writes it beside its sealed answer."""
+"""Draws an experiment from a seed, runs it through the plant and its sensors, and writes it with its sealed answer."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SMALL_ROWS = 250
 
 
 class AgainError(Exception):
-    """What was drawn makes no sense; draw again."""
+    """The drawn experiment is impossible; draw again."""
 
 
 def draw_runs(machine, rng: np.random.Generator) -> list[Run]:
@@ -107,7 +107,7 @@ def small_errors(local: Local, items: list[Item], noise_um: float, rng) -> tuple
 
 
 def draw_causes(kind, plant, local, noise_um, rng) -> tuple[list[dict], list[tuple[Item, float]], set, dict]:
-    """Causes as the truth lists them, how to put them into a plant, the keys they take, and what is strange."""
+    """Causes as the truth lists them, how to put them into a plant, the keys they take, and the unmodelled ones."""
     items = library(plant, rng)
     truth, put, taken, odd = [], [], set(), {}
     if kind in ("single", "pair"):
@@ -214,7 +214,7 @@ def slow_noise(times: np.ndarray, sigma: float, seconds: float, rng: np.random.G
 
 
 def sensed(plant: Plant, off: Off, number: int, s: dict, rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """Columns of a run's log before anything is left out."""
+    """Columns of a run's log before any is removed."""
     run, machine = plant.runs[number], plant.machine
     u, uf = ("rad", "Nmm") if machine.rotary else ("mm", "N")
     times = run.rows
@@ -256,7 +256,7 @@ def sensed(plant: Plant, off: Off, number: int, s: dict, rng: np.random.Generato
 
 
 def kept_columns(columns: dict, channels: str, with_temperature: bool, forces: tuple[str, ...]) -> dict:
-    """What of a log is written at this choice of channels."""
+    """Columns of a log that are written at this choice of channels."""
 
     def out(name: str) -> bool:
         cmd, act = name.startswith("cmd_"), name.startswith("act_")
@@ -290,7 +290,7 @@ def write_log(path: Path, columns: dict, empty: np.ndarray | None) -> None:
 
 
 def make(seed: int, out: Path, only: str | None) -> None:
-    """Writes experiment e-<seed> and its truth; draws again, in a fixed order, what makes no sense."""
+    """Writes experiment e-<seed> and its truth; redraws impossible experiments in a fixed order."""
     for attempt in range(20):
         try:
             return attempt_one(seed, np.random.default_rng([seed, attempt, 7919]), out, only)

@@ -20,7 +20,7 @@ SLOW = 1.0  # mm/s below which a guide rubs a little more; a thousandth of it in
 
 @dataclass(frozen=True)
 class Line:
-    """What a line of a program does: rapid, feed, plunge or nothing; feed mm/min, spindle rpm."""
+    """Motion of a line of a program: rapid, feed, plunge or none; feed mm/min, spindle rpm."""
 
     does: str
     feed: float
@@ -203,7 +203,7 @@ class Warmth:
 
 @dataclass
 class Rows:
-    """What one run does at some times."""
+    """States of one run at some times."""
 
     tip: np.ndarray  # program frame, at the times of the tip measurement
     motor: np.ndarray
