@@ -127,25 +127,18 @@ class PlainCorrector:
         run = loads.run
         uncertainty = RunUncertainty.of(self.job, whole, before, after, met) if self.job.config.uncertain else None
         policy = self.job.config.compensation.policy if uncertainty is not None else "full"
-        if self.field is None:
-            force = self.job.frame.vectors(np.concatenate((loads.first, loads.last)))
-            self.field = Field(self.machine, force, self.job.frame.origin, TileFiles(self.machine))
+        self._set_up(run, loads)
         if uncertainty is not None and policy == "skip":
             loads = self._left_lines(run, loads, uncertainty)
         lead, trail = joints_at(loads, run.plain.kind, before, after)
-        self.resolution = self.language.step_mm(self.job.config.control.resolution_mm, run.state.unit)
-        self.budget = float(chord_budget(np.array(self.tolerance), self.resolution))
         tolerance = np.full(run.motions, self.budget)
         hard = (loads.length > EASY_MM) & (run.plain.kind == LINE)
-        settled = False
         for left in range(ROUNDS, 0, -1):
             rows = self._rows(run=run, loads=loads, lead=lead, trail=trail, hard=hard, tolerance=tolerance)
             answers = self._answers(rows)
             commanded, kept, share = self._commanded(rows, answers, loads.of, uncertainty, policy)
-            if not settled:
-                settled = True
-                if self._drop_small_joints(rows, commanded, carry, lead, trail):
-                    continue
+            if left == ROUNDS and self._drop_small_joints(rows, commanded, carry, lead, trail):
+                continue
             middles = self._middles(run, loads, rows, share)
             told = self._halfway(commanded, carry.commanded)[middles.rows] - middles.wanted
             bent = (_sizes(told) > self.budget) & ~hard[middles.move]
@@ -172,25 +165,28 @@ class PlainCorrector:
             tolerance = np.where(missed, tolerance * shrink, tolerance)
         begin = carry.written
         carry.__dict__.update(trial.__dict__)
-        meant: Floats | None = None
+        meant, bands = None, None
         if share is not None:
             meant = self._left(judged, answers, middles, share)
             error = error + meant
-        bands = (
-            None
-            if uncertainty is None
-            else self._bands(
+        if uncertainty is not None:
+            bands = self._bands(
                 uncertainty, rows, answers=answers, judged=judged, error=error, written=written, share=share
             )
-        )
-        unloaded = np.concatenate((answers.unloaded[judged], middles.unloaded))
-        seen = np.concatenate((np.flatnonzero(judged), middles.rows))
-        back = self._back(unloaded)
         return CorrectedRun(
-            data=data, run=run, rows=rows, answers=answers, commanded=commanded, written=written, before=back,
-            after=error, begin=begin, feed=held, rest=rest, seen=seen, bands=bands, left=meant,
+            data=data, run=run, rows=rows, answers=answers, commanded=commanded, written=written, after=error,
+            before=self._back(np.concatenate((answers.unloaded[judged], middles.unloaded))), begin=begin, feed=held,
+            rest=rest, seen=np.concatenate((np.flatnonzero(judged), middles.rows)), bands=bands, left=meant,
             apart=bool(carry.apart),
         )  # fmt: skip
+
+    def _set_up(self, run: PlainRun, loads: Loads) -> None:
+        """Set resolution and chord budget of a run; make the field of corrections on the first run."""
+        if self.field is None:
+            force = self.job.frame.vectors(np.concatenate((loads.first, loads.last)))
+            self.field = Field(self.machine, force, self.job.frame.origin, TileFiles(self.machine))
+        self.resolution = self.language.step_mm(self.job.config.control.resolution_mm, run.state.unit)
+        self.budget = float(chord_budget(np.array(self.tolerance), self.resolution))
 
     def _bands(
         self, uncertainty: RunUncertainty, rows: PlainRows, *, answers: Answers, judged: Bools, error: Floats,

@@ -72,9 +72,8 @@ def corrected_rows(
     before = path.start[:1] if begins else start[:1]
     step = np.linalg.norm(start - np.concatenate((before, stop[:-1])), axis=1)
     layout = row_layout(path, track, step, program.step_mm(job.config.control.resolution_mm))
-    corrected, leading, trailing = layout.corrected, layout.leading, layout.trailing
-    keep = (k > 0) | leading[nodes.piece]
-    extra = np.flatnonzero(trailing)
+    keep = (k > 0) | layout.leading[nodes.piece]
+    extra = np.flatnonzero(layout.trailing)
     piece = np.concatenate((nodes.piece[keep], extra))
     w = np.concatenate((nodes.w[keep], np.ones(len(extra))))
     joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
@@ -99,7 +98,7 @@ def corrected_rows(
     force = track.force(piece, w)
     force[trailing_row] = 0.0
     rows_kind = np.where(kind[piece] == RAPID, RAPID, LINE)
-    passed = ~corrected[piece]
+    passed = ~layout.corrected[piece]
     whole = (passed | kept[piece]) & ~joining & (np.bincount(piece, minlength=len(kind)) == 1)[piece]
     rows_kind = np.where(circles.on, ARC, np.where(whole, kind[piece], rows_kind))
     end[whole & ~circles.on] = target[whole & ~circles.on]

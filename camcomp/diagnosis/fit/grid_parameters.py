@@ -23,7 +23,7 @@ White = Callable[[int, ByChannel], ByChannel]  # what makes columns of a run whi
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class ReducedResidual:
     """A residual from which other columns are removed by a ridge fit, and the same removal for further columns.
 
     Residual and candidate columns lose the same part: a warm-up minus its mean is another curve than a warm-up.
@@ -43,10 +43,10 @@ class Beside:
         )
 
 
-def beside(
+def reduced_residual(
     grams: Sequence[Gram], white: Sequence[ByChannel], residual: Sequence[Floats], columns: Columns, others: Ints
-) -> Beside:
-    """White residual per run with the columns `others` softly fitted and taken out."""
+) -> ReducedResidual:
+    """Residual per run after a ridge fit of the columns `others`."""
     data = total(grams)
     precision = np.where(columns.candidate >= 0, 1.0 / 9.0, columns.prior.precision(1.0))[others]
     M = data.A[np.ix_(others, others)] + np.diag(precision)
@@ -55,27 +55,31 @@ def beside(
     half = np.linalg.solve(L, np.diag(size))
     a = np.zeros(len(data.b))
     a[others] = half.T @ (half @ data.b[others])
-    return Beside([r - W @ a for r, W in zip(residual, white, strict=True)], white, others, half)
+    return ReducedResidual([r - W @ a for r, W in zip(residual, white, strict=True)], white, others, half)
 
 
-def best_shape(bench: Bench, candidate: CandidateCause, left: Beside, whitened: White) -> dict[str, float] | None:
+def best_shape(
+    bench: Bench, candidate: CandidateCause, reduced: ReducedResidual, whitened: White
+) -> dict[str, float] | None:
     """The scanned shape whose columns explain most of the residual; None where the effect is not scanned."""
     p = candidate.shapes[0]
     values = np.asarray(p.scan)
     values = np.sort(values[values <= max(longest(bench, candidate, p), values.min())])
-    gains = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in values], left, whitened)
+    gains = _gains(
+        bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in values], reduced, whitened
+    )
     if gains is None:
         return None
     best = int(np.argmax(gains))
     # between its neighbours the gain has one peak, and a large effect off its peak leaves what looks like noise
     near = np.geomspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], _FINER)
-    finer = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in near], left, whitened)
+    finer = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in near], reduced, whitened)
     value = near[int(np.argmax(finer))] if finer is not None and finer.max() > gains[best] else values[best]
     return {**shape_default(candidate), p.name: float(value)}
 
 
 def longest(bench: Bench, candidate: CandidateCause, p: Parameter) -> float:
-    """Upper bound of a shape, in its unit: of a period, what was driven holds often enough to show that it comes back."""
+    """Upper bound of a shape, in its unit: of a period, the driven travel has to hold enough periods."""
     if p.turns == 0.0:
         return p.high
     which = cause_of(candidate, {}).which(bench.actuators)
@@ -84,7 +88,7 @@ def longest(bench: Bench, candidate: CandidateCause, p: Parameter) -> float:
 
 
 def _gains(
-    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], left: Beside,
+    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], reduced: ReducedResidual,
     whitened: White,
 ) -> Floats | None:  # fmt: skip
     """Chi-square (v,) that an effect explains with each of v shapes under the prior of its size; None where it is not
@@ -99,17 +103,17 @@ def _gains(
         if columns is None:
             return None
         white = [whitened(k, each) for k, each in enumerate(columns)]
-        lost = left.taken(white)
+        lost = reduced.taken(white)
         products = sum((W.T @ W for W in white), -lost.T @ lost).reshape(len(some), own, len(some), own)
         each = np.arange(len(some))
         G = products[each, :, each] + (1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(own)
-        h = sum((W.T @ r for W, r in zip(white, left.rest, strict=True)), np.zeros(1)).reshape(-1, own)
+        h = sum((W.T @ r for W, r in zip(white, reduced.rest, strict=True)), np.zeros(1)).reshape(-1, own)
         gains.append(np.einsum("vp,vp->v", h, np.linalg.solve(G, h[:, :, None])[:, :, 0]))
     return np.concatenate(gains)
 
 
 def settled_interval(
-    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], left: Beside,
+    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], reduced: ReducedResidual,
     whitened: White,
 ) -> dict[str, float]:  # fmt: skip
     """The interval, near the best candidate interval, whose columns explain most after the removal of the other
@@ -118,14 +122,14 @@ def settled_interval(
     An interval that begins at a reversal resembles play: a residual without all plays shows less of it there.
     """
     paths = [run.run_path for run in bench.runs]
-    every = _gains(bench, candidate, shapes, left, whitened)
+    every = _gains(bench, candidate, shapes, reduced, whitened)
     best, (start, end) = dict(shapes[0 if every is None else int(every.argmax())]), [p.name for p in candidate.shapes]
     run = next((p for p in paths if p.started <= 0.5 * (best[start] + best[end]) <= p.started + p.time[-1]), paths[0])
     row, step, most = float(np.median(np.diff(run.time))), 4, -np.inf
     while step:
         near = [best, *({**best, which: best[which] + sign * step * row} for which in (start, end) for sign in (-1, 1))]
         near = [each for each in near if each[end] - each[start] > 2 * row]
-        gains = _gains(bench, candidate, near, left, whitened) if near else None
+        gains = _gains(bench, candidate, near, reduced, whitened) if near else None
         if gains is None:
             return best
         if gains.max() > most and gains.argmax() > 0:

@@ -28,7 +28,7 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
     shapes = problem.shape_columns(f.members, f.theta, f.extra) if s else [np.zeros((len(W), 0)) for W in f.white]
     # a shape that the data do not tell is known to about a third
     reach = np.array([0.3 * f.extra[i][p.name] for i, p in names])
-    G = [W.beside(D * reach) for W, D in zip(problem.white_at(f), shapes, strict=True)]
+    G = [W.appended(D * reach) for W, D in zip(problem.white_at(f), shapes, strict=True)]
     usual, most = _stated(problem, problem.prior.precision(f.factor), problem.prior.reach.copy())
     precision = np.concatenate([usual, np.ones(s)])
     precision[index] = 1e-2 / problem.prior.scale[index] ** 2

@@ -17,7 +17,7 @@ from camcomp.diagnosis.fit.columns import (
     shape_default,
 )
 from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, least_noise, measure_floor
-from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, settled_interval
+from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, reduced_residual, settled_interval
 from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
@@ -117,7 +117,7 @@ def _scanned(problem: Problem) -> Problem:
     scanned = [i for i in problem.shapes if problem.columns.candidates[i].shapes]
     own = [c for i in scanned for c in problem.candidates.columns[i]]
     others = np.setdiff1d(np.arange(len(problem.columns.names)), own)
-    left = beside(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
+    reduced = reduced_residual(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
     changed: list[tuple[list[int], list[list[Floats]]]] = []
     for i in scanned:
         candidate = problem.columns.candidates[i]
@@ -126,10 +126,10 @@ def _scanned(problem: Problem) -> Problem:
             if always is None:
                 continue
             white = [problem.white_columns(k, each) for k, each in enumerate(always)]
-            near = likely_intervals(problem.bench, candidate, white, left.rest, problem.row_places)
-            best = settled_interval(problem.bench, candidate, near, left, problem.white_columns) if near else None
+            near = likely_intervals(problem.bench, candidate, white, reduced.rest, problem.row_places)
+            best = settled_interval(problem.bench, candidate, near, reduced, problem.white_columns) if near else None
         else:
-            best = best_shape(problem.bench, candidate, left, problem.white_columns)
+            best = best_shape(problem.bench, candidate, reduced, problem.white_columns)
         if best is None:
             continue
         problem.shapes[i] = best

@@ -1,12 +1,13 @@
-"""Patterns that no library states: what a leftover may depend on, covariate by covariate.
+"""Patterns that no library states: covariates on which a residual may depend.
 
-They serve three ends: the noise is measured beside them, an unknown effect is found by them, and they name what it
-depends on. A pattern moves a carriage (and so the tip, through the machine's own Jacobian), an encoder, a drive force,
+They serve three ends: the noise is measured jointly with them, an unknown effect is found by them, and they name the
+covariates that it depends on. A pattern moves a carriage (and so the tip, through the machine's own Jacobian), an encoder, a drive force,
 the tip itself, or the dynamometer.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -82,7 +83,7 @@ def _sizes(grounds: Sequence[Ground]) -> _Sizes:
 
 
 def _of_actuator(g: Ground, size: _Sizes, j: int, knots: int) -> dict[str, list[Floats]]:
-    """Functions (n,) of about size one of what actuator j does, by covariate."""
+    """Functions (n,) of about size one of the motion and force of actuator j, by covariate."""
     m = g.motion
     x = (m.encoder[:, j] - size.low[j]) / size.span[j]
     v = m.speed[:, j] / size.fast[j]
@@ -104,7 +105,7 @@ def hats(x: Floats, knots: int) -> list[Floats]:
 
 
 def _of_time(g: Ground, size: _Sizes, *, warmth: bool) -> dict[str, list[Floats]]:
-    """Functions (n,) of time, and of temperature where some run logged it: one that did not says nothing of it."""
+    """Functions (n,) of time, and of temperature where some run logged it; zero in runs that did not."""
     t = 2.0 * (g.motion.common - size.start) / size.length - 1.0
     own = g.motion.time - g.motion.time[0]
     u = 2.0 * own / max(float(own[-1]), 1e-9) - 1.0
@@ -124,21 +125,27 @@ def _of_direction(g: Ground) -> list[Floats]:
 
 
 class _Store:
-    """Collects patterns of one kind; patterns that are zero in every run are dropped."""
+    """Collects patterns of one kind in its unit, um or N; patterns that are zero in every run are dropped."""
 
     def __init__(self, kind: str, first: int, width: int, runs: int) -> None:
         self.kind, self.first, self.width = kind, first, width
+        self.size = 1e-3 if kind in ("tip", "encoder") else 1.0
         self.labels: list[str] = []
         self.channels: list[int] = []
         self.columns: list[list[Floats]] = [[] for _ in range(runs)]
 
-    def put(self, label: str, channel: int, per_run: Sequence[Floats], size: float) -> None:
-        if max(float(np.abs(v).max(initial=0.0)) for v in per_run) < 1e-12:
-            return
-        self.labels.append(label)
-        self.channels.append(channel)
-        for store, values in zip(self.columns, per_run, strict=True):
-            store.append(size * values)
+    def put(self, label: str, channels: Iterable[int], functions: Iterable[Sequence[Floats]]) -> None:
+        """Add every function, of every run, to each of the channels."""
+        each = [
+            per_run
+            for per_run in zip(*functions, strict=True)
+            if any(np.abs(v).max(initial=0.0) >= 1e-12 for v in per_run)
+        ]
+        for per_run, channel in product(each, channels):
+            self.labels.append(label)
+            self.channels.append(channel)
+            for store, values in zip(self.columns, per_run, strict=True):
+                store.append(self.size * values)
 
     def done(self) -> Dictionary:
         return Dictionary(self.kind, self.first, tuple(self.labels), tuple(map(self._block, self.columns)))
@@ -154,70 +161,47 @@ def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dict
     """All patterns of the channels that were measured; unit size is 1 um or 1 N."""
     size, m = _sizes(grounds), len(actuators)
     rows = sum(len(g.tip) for g in grounds)
-    knots_of, places_of = (int(np.clip(rows / r, 4, most)) for r, most in ((250, _KNOTS), (150, _PLACES)))
-    found = {name: any(g.present[name] for g in grounds) for name in KINDS}
-    stores = {
-        "tip": _Store("tip", 0, 3, len(grounds)),
-        "encoder": _Store("encoder", 3, m, len(grounds)),
-        "drive": _Store("drive", 3 + m, m, len(grounds)),
-        "dyno": _Store("dyno", 3 + 2 * m, 3, len(grounds)),
-    }
+    knots = int(np.clip(rows / 250, 4, _KNOTS))
+    every = [
+        _Store("tip", 0, 3, len(grounds)), _Store("encoder", 3, m, len(grounds)),
+        _Store("drive", 3 + m, m, len(grounds)), _Store("dyno", 3 + 2 * m, 3, len(grounds)),
+    ]  # fmt: skip
+    stores = {store.kind: store for store in every if any(g.present[store.kind] for g in grounds)}
     for j, a in enumerate(actuators):
-        for kind, knots in (("tip", knots_of), ("encoder", 5), ("drive", knots_of)):
-            if not found[kind]:
+        for kind, store in stores.items():
+            if kind == "dyno":
                 continue
-            per_run = [_of_actuator(g, size, j, knots) for g in grounds]
-            for name in per_run[0]:
-                if kind == "encoder" and name == "force":
-                    continue
-                for i in range(len(per_run[0][name])):
-                    values = [functions[name][i] for functions in per_run]
-                    # a carriage that strays, strays in any direction: the tip is given all three axes
-                    for channel in range(3) if kind == "tip" else (j,):
-                        stores[kind].put(f"{name}:{a}", channel, values, 1.0 if kind == "drive" else 1e-3)
+            per_run = [_of_actuator(g, size, j, 5 if kind == "encoder" else knots) for g in grounds]
+            for name in [name for name in per_run[0] if (kind, name) != ("encoder", "force")]:
+                # a displaced carriage moves the tip in any direction
+                store.put(f"{name}:{a}", range(3) if kind == "tip" else (j,), [f[name] for f in per_run])
     warmth = any(g.motion.temperature is not None for g in grounds)
     times = [_of_time(g, size, warmth=warmth) for g in grounds]
-    names = {"tip": "xyz", "encoder": actuators, "drive": actuators, "dyno": "xyz"}
-    for kind in KINDS:
-        if not found[kind]:
-            continue
-        for channel, axis_name in enumerate(names[kind]):
+    for kind, store in stores.items():
+        for channel, of in enumerate("xyz" if kind in ("tip", "dyno") else actuators):
             for name in times[0]:
-                for i in range(len(times[0][name])):
-                    values = [functions[name][i] for functions in times]
-                    stores[kind].put(
-                        f"{name}:{axis_name}", channel, values, 1e-3 if kind in ("tip", "encoder") else 1.0
-                    )
-    if found["tip"]:
-        # what happens at a moment: hats over the time in which something was measured, one run after the other
-        spent = [g.motion.time - g.motion.time[0] for g in grounds]
-        begin = np.concatenate([[0.0], np.cumsum([float(t[-1]) for t in spent])])
-        knots = int(np.clip(rows / 100, 4, _MOMENTS))
-        moments = [hats((b + t) / max(float(begin[-1]), 1e-9), knots) for b, t in zip(begin, spent, strict=False)]
-        for i in range(knots):
-            for channel, axis_name in enumerate("xyz"):
-                stores["tip"].put(f"time:{axis_name}", channel, [each[i] for each in moments], 1e-3)
-    places = np.concatenate([g.tip for g in grounds])
-    low, span = places.min(axis=0), np.ptp(places, axis=0)
-    for axis, name in enumerate("xyz"):
-        if not found["tip"] or span[axis] < MOVES_MM:
-            continue
-        per_place = [hats((g.tip[:, axis] - low[axis]) / span[axis], places_of) for g in grounds]
-        for i in range(places_of):
-            for channel in range(3):
-                stores["tip"].put(f"position:{name}", channel, [each[i] for each in per_place], 1e-3)
+                store.put(f"{name}:{of}", (channel,), [functions[name] for functions in times])
+    if "tip" in stores:
+        _put_moments_and_places(stores["tip"], grounds, rows)
     turns = [_of_direction(g) for g in grounds]
     for axis, name in enumerate("xyz"):
-        for i in range(len(turns[0])):
-            values = [t[i] for t in turns]
-            if found["tip"]:
-                stores["tip"].put(f"direction:{name}", axis, values, 1e-3)
-            if found["dyno"]:
-                stores["dyno"].put(f"direction:{name}", axis, values, 1.0)
-        pushes = [g.force[:, axis] / 100.0 for g in grounds]
-        if found["tip"]:
-            for channel in range(3):
-                stores["tip"].put(f"force:{name}", channel, pushes, 1e-3)
-        if found["dyno"]:
-            stores["dyno"].put(f"force:{name}", axis, pushes, 1.0)
-    return [store.done() for kind, store in stores.items() if found[kind]]
+        loads = [[g.force[:, axis] / 100.0] for g in grounds]
+        for kind, store in stores.items():
+            if kind in ("tip", "dyno"):
+                store.put(f"direction:{name}", (axis,), turns)
+                store.put(f"force:{name}", range(3) if kind == "tip" else (axis,), loads)
+    return [store.done() for store in stores.values()]
+
+
+def _put_moments_and_places(tip: _Store, grounds: Sequence[Ground], rows: int) -> None:
+    """Add hats over the measured time, one run after the other, and over the axes of the workpiece."""
+    spent = [g.motion.time - g.motion.time[0] for g in grounds]
+    begin = np.concatenate([[0.0], np.cumsum([float(t[-1]) for t in spent])])
+    knots, places_of = int(np.clip(rows / 100, 4, _MOMENTS)), int(np.clip(rows / 150, 4, _PLACES))
+    moments = [hats((b + t) / max(float(begin[-1]), 1e-9), knots) for b, t in zip(begin, spent, strict=False)]
+    for i, (channel, axis) in product(range(knots), enumerate("xyz")):
+        tip.put(f"time:{axis}", (channel,), [[each[i]] for each in moments])
+    places = np.concatenate([g.tip for g in grounds])
+    low, span = places.min(axis=0), np.ptp(places, axis=0)
+    for k in np.flatnonzero(span >= MOVES_MM):
+        tip.put(f"position:{'xyz'[k]}", range(3), [hats((g.tip[:, k] - low[k]) / span[k], places_of) for g in grounds])

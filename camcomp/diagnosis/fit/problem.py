@@ -154,11 +154,7 @@ class Problem:
         index = self.member_columns(members)
         grams = self.base_grams
         if not members:
-            scale = Scale(total(grams), self.prior, self.candidates)
-            return Fitted(
-                members=(), theta=np.zeros(0), covariance=np.zeros((0, 0)), log_evidence=scale(()), grams=grams,
-                extra={}, factor=scale.factor(()),
-            )  # fmt: skip
+            return self._without_members()
         if theta is None:
             theta = estimate(total(grams), self.prior, index)[0][index]
         theta = self._bounded(members, theta)
@@ -174,7 +170,6 @@ class Problem:
             now = self._white_at(readings)
             bend = self._bend(now, index, theta)
             if step == 0 and not shapes and bend < STRAIGHT:
-                grams = self.base_grams
                 theta = self._bounded(members, estimate(total(grams), self.prior, index)[0][index])
                 break
             bent = bent or (step == 0 and bend > BENT)
@@ -187,8 +182,7 @@ class Problem:
             grams = self._grams_at(index, white, left)
             mean, full = estimate(total(grams), self.prior, index)
             after = self._bounded(members, mean[index])
-            change = after - theta
-            theta = after
+            change, theta = after - theta, after
             size = float(change @ np.linalg.solve(full[np.ix_(index, index)] + 1e-18 * np.eye(len(index)), change))
             if self.shapes_of(members) and (step < passes - 1 or (far and step < most - 1)):
                 size, far, sought = self._move_shapes(
@@ -199,14 +193,11 @@ class Problem:
             if step > 0 and size < SETTLED:
                 break
         causes = self.causes(members, theta, shapes)
-        beside = small_forces(self.columns.candidates, members, causes) if bent else ()
-        pushed, pushed_at = tuple(self.member_columns(beside)), theta
-        if beside:
-            farther = self._pushed(beside, causes)
-            both = [
-                np.column_stack([own, self.whitened(k, far)])
-                for k, (own, far) in enumerate(zip(white, farther, strict=True))
-            ]
+        small = small_forces(self.columns.candidates, members, causes) if bent else ()
+        pushed, pushed_at = tuple(self.member_columns(small)), theta
+        if small:
+            also = [self.whitened(k, each) for k, each in enumerate(self._pushed(small, causes))]
+            both = [np.column_stack(pair) for pair in zip(white, also, strict=True)]
             grams = self._grams_at([*index, *pushed], both, left)
         scale = Scale(total(grams), self.prior, self.candidates)
         factor = scale.factor(members)
@@ -217,9 +208,16 @@ class Problem:
             extra=shapes, factor=factor, white=tuple(white), residual=tuple(left), pushed=pushed, pushed_at=pushed_at,
         )  # fmt: skip
 
-    def _pushed(self, beside: Members, causes: Sequence[Cause]) -> tuple[Floats, ...]:
-        """Per run (n, c, p): what small forces do to the channels of the machine that the causes make."""
-        forces = [(self.columns.candidates[i], self.shapes.get(i, {})) for i in beside]
+    def _without_members(self) -> Fitted:
+        scale = Scale(total(self.base_grams), self.prior, self.candidates)
+        return Fitted(
+            members=(), theta=np.zeros(0), covariance=np.zeros((0, 0)), log_evidence=scale(()), grams=self.base_grams,
+            extra={}, factor=scale.factor(()),
+        )  # fmt: skip
+
+    def _pushed(self, small: Members, causes: Sequence[Cause]) -> tuple[Floats, ...]:
+        """Per run (n, c, p): effect of small forces on the channels of the machine that the causes make."""
+        forces = [(self.columns.candidates[i], self.shapes.get(i, {})) for i in small]
         return pushed_farther(self.bench, causes, self._read(causes), forces)
 
     def farther(self, f: Fitted) -> tuple[Floats, ...]:
@@ -227,8 +225,8 @@ class Problem:
         if self._farther is None or self._farther[0] is not f:
             assert f.pushed_at is not None
             causes = self.causes(f.members, f.pushed_at, f.extra)
-            beside = small_forces(self.columns.candidates, f.members, causes)
-            self._farther = f, self._pushed(beside, causes)
+            small = small_forces(self.columns.candidates, f.members, causes)
+            self._farther = f, self._pushed(small, causes)
         return self._farther[1]
 
     def white_at(self, f: Fitted) -> list[ByChannel]:

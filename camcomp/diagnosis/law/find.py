@@ -122,7 +122,7 @@ class _Search:
         if not chosen:
             return self.folds
         more = [self._white(term) for term in chosen]
-        return self.folds.beside(more, np.concatenate([self._precision(term) for term in chosen]))
+        return self.folds.extended(more, np.concatenate([self._precision(term) for term in chosen]))
 
     def _white(self, term: Term) -> White:
         return self.shapes.columns(term)[0]

@@ -83,7 +83,7 @@ class Folds:
             self._put(constants, loose)
         self._factorise()
 
-    def beside(self, more: Sequence[White], precision: Floats) -> Folds:
+    def extended(self, more: Sequence[White], precision: Floats) -> Folds:
         """The same with more columns in the base, of that prior precision."""
         out = copy(self)
         out._put(more, precision)
@@ -129,7 +129,7 @@ class Folds:
         """Coordinates (f, k) of the base, fitted jointly with law columns of that prior precision: with all data, and
         without each part.
         """
-        both = self.beside(more, precision)
+        both = self.extended(more, precision)
         found = [solve_triangular(L.T, t, lower=False) for L, t in zip(both._halves, both._targets, strict=True)]
         return np.array(found)[:, : len(self.precision)]
 

@@ -48,6 +48,14 @@ class Form:
         return replace(self, shape=held)
 
 
+def _one(
+    family: str, name: str, text: str, unit: str, *,
+    shape: tuple[float, ...] = (), bounds: tuple[tuple[float, float], ...] = (),
+) -> Form:  # fmt: skip
+    """A form of one function of one covariate."""
+    return Form(family=family, about=(name,), texts=(text,), units=(unit,), shape=shape, bounds=bounds)
+
+
 def _waves(name: str, low: float, span: float, shortest: float) -> list[Form]:
     """Sines and cosines of one covariate; neighbours differ by a quarter of a turn over its span."""
     del low
@@ -65,27 +73,13 @@ def _bumps(name: str, low: float, span: float) -> list[Form]:
     for centre in np.linspace(low, low + span, _CENTRES):
         for width in (0.06 * span, 0.12 * span, 0.24 * span):
             bounds = ((low - 0.1 * span, low + 1.1 * span), (0.02 * span, 0.5 * span))
-            out.append(
-                Form(
-                    family="bump",
-                    about=(name,),
-                    texts=(text,),
-                    units=("",),
-                    shape=(float(centre), width),
-                    bounds=bounds,
-                )
-            )
+            out.append(_one("bump", name, text, "", shape=(float(centre), width), bounds=bounds))
     return out
 
 
 def _powers(name: str, unit: str, most: int) -> list[Form]:
     return [
-        Form(
-            family="power" if k > 1 else "line",
-            about=(name,),
-            texts=(name if k == 1 else f"{name}^{k}",),
-            units=(f"{unit}{k if k > 1 else ''}",),
-        )
+        _one("power" if k > 1 else "line", name, name if k == 1 else f"{name}^{k}", f"{unit}{k if k > 1 else ''}")
         for k in range(1, most + 1)
     ]
 
@@ -95,39 +89,14 @@ def _senses(name: str, span: float) -> list[Form]:
     out = []
     for length in (_HARD_MM, 0.02 * span, 0.06 * span, 0.18 * span):
         bounds = ((0.2 * _HARD_MM, 0.5 * span),)
-        out.append(
-            Form(
-                family="sense",
-                about=(name,),
-                texts=(f"way({name}, {{0}})",),
-                units=("",),
-                shape=(length,),
-                bounds=bounds,
-            )
-        )
+        out.append(_one("sense", name, f"way({name}, {{0}})", "", shape=(length,), bounds=bounds))
     for width in (0.04 * span, 0.12 * span, 0.3 * span):
         out.append(
-            Form(
-                family="drag",
-                about=(name,),
-                texts=(f"drag({name}, {{0}})",),
-                units=("mm",),
-                shape=(width,),
-                bounds=((0.005 * span, 0.8 * span),),
-            )
+            _one("drag", name, f"drag({name}, {{0}})", "mm", shape=(width,), bounds=((0.005 * span, 0.8 * span),))
         )
     for length in (0.02 * span, 0.06 * span, 0.2 * span):
         text = f"way({name}, {_HARD_MM})*exp(-since({name})/{{0}})"
-        out.append(
-            Form(
-                family="reversal",
-                about=(name,),
-                texts=(text,),
-                units=("",),
-                shape=(length,),
-                bounds=((0.005 * span, 0.8 * span),),
-            )
-        )
+        out.append(_one("reversal", name, text, "", shape=(length,), bounds=((0.005 * span, 0.8 * span),)))
     return out
 
 
@@ -139,45 +108,22 @@ def _times(size: Sizes) -> list[Form]:
     for a, b in size.stretches:
         bounds = ((a, b),)
         for moment in np.linspace(a, b, max(_MOMENTS // len(size.stretches), 6))[1:-1]:
-            out.append(
-                Form(
-                    family="step",
-                    about=("common_s",),
-                    texts=("step(common_s - {0})",),
-                    units=("",),
-                    shape=(float(moment),),
-                    bounds=bounds,
-                )
-            )
+            out.append(_one("step", "common_s", "step(common_s - {0})", "", shape=(float(moment),), bounds=bounds))
             for last in _LASTS:
                 text = "step(common_s - {0})*step({0} + {1} - common_s)"
                 out.append(
-                    Form(
-                        family="while",
-                        about=("common_s",),
-                        texts=(text,),
-                        units=("",),
-                        shape=(float(moment), last),
-                        bounds=((a, b), (0.2, 30.0)),
-                    )
+                    _one("while", "common_s", text, "", shape=(float(moment), last), bounds=((a, b), (0.2, 30.0)))
                 )
     out += [
-        Form(
-            family="step",
-            about=("common_s",),
-            texts=("step(common_s - {0})",),
-            units=("",),
-            shape=(a,),
-            bounds=((low, high),),
-        )
+        _one("step", "common_s", "step(common_s - {0})", "", shape=(a,), bounds=((low, high),))
         for a, _ in size.stretches[1:]
     ]
     out += [
-        Form(
-            family="settling",
-            about=("common_s",),
-            texts=("exp(-common_s/{0})",),
-            units=("",),
+        _one(
+            "settling",
+            "common_s",
+            "exp(-common_s/{0})",
+            "",
             shape=(share * span,),
             bounds=((0.01 * span, 10.0 * span),),
         )
@@ -202,7 +148,7 @@ def _times(size: Sizes) -> list[Form]:
         worn = size.limits["cut_min"][1]
         settled = "log(1 + cut_min/{0})"
         kinds: list[tuple[tuple[str, ...], ...]] = [(("cut_min",), (settled,), ("",))]
-        if "force_N" in size.limits and size.wide("force_N"):  # what creeps gives way to the force of the moment too
+        if "force_N" in size.limits and size.wide("force_N"):  # creep follows the present force, too
             kinds.append((("cut_min", "force_N"), (settled, f"{settled}*force_N"), ("", "N")))
         for share in (0.02, 0.05, 0.2):
             bounds = ((1e-3 * worn, worn),)
@@ -211,8 +157,8 @@ def _times(size: Sizes) -> list[Form]:
                 for about, texts, units in kinds
             ]
     if size.wide("temp_C"):
-        out.append(Form(family="line", about=("temp_C",), texts=("(temp_C - 20)",), units=("K",)))
-        out.append(Form(family="power", about=("temp_C",), texts=("(temp_C - 20)^2",), units=("K2",)))
+        out.append(_one("line", "temp_C", "(temp_C - 20)", "K"))
+        out.append(_one("power", "temp_C", "(temp_C - 20)^2", "K2"))
     return out
 
 
@@ -225,22 +171,15 @@ def at_tip(size: Sizes) -> list[Form]:
         low, span = size.limits[name][0], size.span(name)
         out += _powers(name, "mm", 4) + _waves(name, low, span, max(3.0 * size.apart[name], span / 25.0))
         out += _bumps(name, low, span) + _senses(name, span)
-        out.append(Form(family="rate", about=(f"v{a}_mm_per_s",), texts=(f"v{a}_mm_per_s",), units=("mm/s",)))
-        out.append(
-            Form(
-                family="rate",
-                about=(f"v{a}_mm_per_s",),
-                texts=(f"v{a}_mm_per_s*abs(v{a}_mm_per_s)",),
-                units=("(mm/s)2",),
-            )
-        )
+        out.append(_one("rate", f"v{a}_mm_per_s", f"v{a}_mm_per_s", "mm/s"))
+        out.append(_one("rate", f"v{a}_mm_per_s", f"v{a}_mm_per_s*abs(v{a}_mm_per_s)", "(mm/s)2"))
     for a, b in [(a, b) for a in axes for b in axes if a < b]:
         out.append(Form(family="product", about=(f"{a}_mm", f"{b}_mm"), texts=(f"{a}_mm*{b}_mm",), units=("mm2",)))
         out.append(Form(family="product", about=(f"{a}_mm", f"{b}_mm"), texts=(f"{a}_mm^2*{b}_mm",), units=("mm3",)))
         out.append(Form(family="product", about=(f"{a}_mm", f"{b}_mm"), texts=(f"{a}_mm*{b}_mm^2",), units=("mm3",)))
     if size.wide("feed_mm_per_s"):
-        out += [Form(family="rate", about=("feed_mm_per_s",), texts=("feed_mm_per_s",), units=("mm/s",))]
-        out += [Form(family="rate", about=("feed_mm_per_s",), texts=("feed_mm_per_s^2",), units=("(mm/s)2",))]
+        out += [_one("rate", "feed_mm_per_s", "feed_mm_per_s", "mm/s")]
+        out += [_one("rate", "feed_mm_per_s", "feed_mm_per_s^2", "(mm/s)2")]
     if len(axes) > 1:
         for k in range(1, 5):
             angle = "heading_rad" if k == 1 else f"{k}*heading_rad"
@@ -249,8 +188,8 @@ def at_tip(size: Sizes) -> list[Form]:
             while_moving = tuple(f"moving*{text}" for text in texts)
             out.append(Form(family=f"heading {k}", about=("heading_rad", "moving"), texts=while_moving, units=("", "")))
     for f in [f"f{a}_N" for a in "xyz" if size.wide(f"f{a}_N")]:
-        out.append(Form(family="force", about=(f,), texts=(f,), units=("N",)))
-        out.append(Form(family="force squared", about=(f,), texts=(f"{f}*abs({f})",), units=("N2",)))
+        out.append(_one("force", f, f, "N"))
+        out.append(_one("force squared", f, f"{f}*abs({f})", "N2"))
         out += [
             Form(family="force by place", about=(f, f"{a}_mm"), texts=(f"{f}*{a}_mm",), units=("N mm",)) for a in axes
         ]
@@ -258,7 +197,7 @@ def at_tip(size: Sizes) -> list[Form]:
 
 
 def at_drive(size: Sizes, revolute: bool) -> list[Form]:
-    """Forms of what shifts an actuator."""
+    """Forms of effects that shift an actuator."""
     unit = "rad" if revolute else "mm"
     name = f"act_{unit}"
     low, span = size.limits[name][0], size.span(name)
@@ -268,8 +207,8 @@ def at_drive(size: Sizes, revolute: bool) -> list[Form]:
     out = _powers(name, unit, 3) + _waves(name, low, span, shortest) + _bumps(name, low, span) + _senses(name, span)
     speed = f"{name}_per_s"
     for text, of in ((speed, f"{unit}/s"), (f"abs({speed})", f"{unit}/s"), (f"{speed}*abs({speed})", f"({unit}/s)2")):
-        out.append(Form(family="rate", about=(speed,), texts=(text,), units=(of,)))
-    out.append(Form(family="acceleration", about=(f"{speed}2",), texts=(f"{speed}2",), units=(f"{unit}/s2",)))
+        out.append(_one("rate", speed, text, of))
+    out.append(_one("acceleration", f"{speed}2", f"{speed}2", f"{unit}/s2"))
     return out + _loads(size) + _times(size)
 
 
@@ -280,10 +219,7 @@ def _loads(size: Sizes) -> list[Form]:
         unit = "N" if name.endswith("N") else "N mm"
         square, cube = (f"({unit}){k}" if " " in unit else f"{unit}{k}" for k in (2, 3))
         if load_of(name) is not None:
-            out.append(Form(family="force", about=(name,), texts=(name,), units=(unit,)))
-        out.append(Form(family="force squared", about=(name,), texts=(f"{name}*abs({name})",), units=(square,)))
-        out += [
-            Form(family="force power", about=(name,), texts=(f"{name}^{k}",), units=(per,))
-            for k, per in ((2, square), (3, cube))
-        ]
+            out.append(_one("force", name, name, unit))
+        out.append(_one("force squared", name, f"{name}*abs({name})", square))
+        out += [_one("force power", name, f"{name}^{k}", per) for k, per in ((2, square), (3, cube))]
     return out

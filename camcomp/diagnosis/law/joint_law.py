@@ -35,7 +35,7 @@ def with_law(
     )
     own = [bench.channels(spot, values) for spot, values in terms]
     blocks = tuple(
-        block.beside(channel_behind_channel(np.concatenate([each[k] for each in own], axis=2)))
+        block.appended(channel_behind_channel(np.concatenate([each[k] for each in own], axis=2)))
         for k, block in enumerate(problem.columns.blocks)
     )
     columns = replace(
@@ -46,7 +46,7 @@ def with_law(
         blocks=blocks,
     )
     white = [
-        W.beside(np.concatenate([x.over(k, 0, len(W)) for x in found.columns], axis=1))
+        W.appended(np.concatenate([x.over(k, 0, len(W)) for x in found.columns], axis=1))
         for k, W in enumerate(problem.white)
     ]
     return replace(problem, columns=columns, white=white)

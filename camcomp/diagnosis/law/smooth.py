@@ -89,7 +89,7 @@ def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundMap | None:
         if best is None or best[0] < LEAST_GAIN:
             break
         chosen.append(best[1])
-        step = folds.beside([bench.white(each.spot, map_values(bench, each)) for each in chosen], _precision(chosen))
+        step = folds.extended([bench.white(each.spot, map_values(bench, each)) for each in chosen], _precision(chosen))
     if not chosen:
         return None
     columns = tuple(bench.white(each.spot, map_values(bench, each)) for each in chosen)

@@ -98,7 +98,7 @@ class ByChannel:
                 parts.append((np.concatenate([on[others], new]), np.concatenate([X[:, others], values], axis=1)))
         return ByChannel(self.width, tuple(parts))
 
-    def beside(self, columns: Floats) -> ByChannel:
+    def appended(self, columns: Floats) -> ByChannel:
         """With more columns (w, d) behind its own."""
         new = np.arange(self.width, self.width + columns.shape[1])
         return ByChannel(self.width + len(new), self.parts).exchanged(new, columns)

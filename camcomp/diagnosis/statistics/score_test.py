@@ -71,7 +71,7 @@ class JointProducts:
         k, p = patterns.white[0].width, sum(map(len, patterns.labels))
         A, B, P, rows = np.zeros((k + 1, k + 1)), np.zeros((k + 1, p)), np.zeros((p, p)), 0.0
         for run, (W, r, parts) in enumerate(zip(patterns.white, patterns.residual, patterns.blocks, strict=True)):
-            joint, row, at = W.beside(r[:, None]), 0, 0
+            joint, row, at = W.appended(r[:, None]), 0, 0
             for kind, (part, names) in enumerate(zip(parts, patterns.labels, strict=True)):
                 square = 1.0 if patterns.weight is None else patterns.weight[run][kind] ** 2
                 own, to = joint[row : row + len(part)], slice(at, at + len(names))

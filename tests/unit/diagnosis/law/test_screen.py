@@ -69,7 +69,7 @@ def screen(bench, keep, at_once):
 def test_in_parts_that_are_not_kept_they_gain_what_they_gain_all_together():
     bench = Runs()
     (whole, base, kept), (parts, _, anew) = screen(bench, True, 100), screen(bench, False, 2)
-    more = base.beside([bench.white(TIPS[1], bench.values(TIPS[1], WAVES[2]))], np.ones(2))
+    more = base.extended([bench.white(TIPS[1], bench.values(TIPS[1], WAVES[2]))], np.ones(2))
     for step in (base, more):
         (expected, by_chance), (got, chance) = whole.gains(step), parts.gains(step)
         assert [term for _, term in got] == [term for _, term in expected]

@@ -69,7 +69,7 @@ def test_columns_are_exchanged_and_put_beside_rows_weighed_and_runs_joined(lean,
     changed[:, [4, 0]] = new
     assert np.array_equal(lean.exchanged([4, 0], new)[:, every], changed)
     assert np.array_equal(lean[:, every], whole), "it stays what it was"
-    assert np.array_equal(lean.beside(new)[:, np.arange(K + 2)], np.concatenate([whole, new], axis=1))
+    assert np.array_equal(lean.appended(new)[:, np.arange(K + 2)], np.concatenate([whole, new], axis=1))
     assert np.array_equal(lean.scaled(weight)[:, every], weight[:, None] * whole)
     assert np.array_equal(ByChannel.behind([lean, lean])[:, every], np.concatenate([whole, whole]))
 
