@@ -49,6 +49,7 @@
     };
     const wide = (spec.paper || byId(spec.name + "-plot").clientWidth) >= NARROW;
     if (square(spec) && wide) base.legend = { x: 1.02, y: 1 };
+    if (layout.scene) base.legend = { orientation: "h", x: 0, y: 0, yanchor: "top" }; // the tools are above
     const axes = Object.keys(layout).filter((k) => /^[xy]axis\d*$/.test(k));
     const out = { ...base, ...layout };
     for (const key of axes)

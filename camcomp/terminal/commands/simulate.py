@@ -7,7 +7,7 @@ import click
 from camcomp.ground.files import display_name, read_bytes, write_all
 from camcomp.ground.places import STANDARD
 from camcomp.ground.progress import part
-from camcomp.terminal.commands._options import OUTPUT, dialect_option, stock_option
+from camcomp.terminal.commands._options import OUTPUT, dialect_option, quiet_option, stock_option
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 @stock_option
 @click.option("--air", is_flag=True, help="The tool does not cut.")
 @click.option("--started-s", type=float, default=0.0, help="Start on the common clock, for effects of warming up.")
+@quiet_option
 def command(
     program: str,
     configs: tuple[str, ...],
@@ -42,6 +43,7 @@ def command(
     stock: "StockChoice | None",
     air: bool,
     started_s: float,
+    quiet: bool,
 ) -> None:
     """Write the log that the modelled machine would produce.
 
@@ -55,19 +57,18 @@ def command(
     machine = load_machine(*configs)
     source, outputs = read_program(program, machine), dict[str, bytes]()
     if output or not (surface or report):
-        with working(f"simulating {program}"):
+        with working(f"simulating {program}", quiet=quiet):
             with part(0.0, 0.5):
                 log = simulate(source, machine, step_s, cutting=not air, started_s=started_s, stock=stock)
             with part(0.5, 1.0):
                 outputs[output or STANDARD] = log.to_csv()
-        for each in log.warnings:
-            say(f"warning: {each}")
+        say(*(f"warning: {each}" for each in log.warnings), quiet=quiet)
     if surface:
-        with working(f"cutting {program}"):
+        with working(f"cutting {program}", quiet=quiet):
             left = simulate_cut(source, machine, stock=stock)
         outputs[surface] = left.to_csv() if surface.endswith(".csv") else left.to_stl()
     if report:
-        with working(f"drawing the walls of {program}"):
+        with working(f"drawing the walls of {program}", quiet=quiet):
             inputs = [
                 Input("configuration", display_name(each), read_bytes(each)) for each in configs if each != STANDARD
             ]

@@ -203,6 +203,18 @@ def test_verbs_tell_it_on_a_terminal_and_nowhere_else(screen, tmp_path, monkeypa
         assert bool(told) == is_terminal
 
 
+def test_a_quiet_simulation_writes_its_log_alone(tmp_path, capsys):
+    program, words = tmp_path / "short.nc", ["--config", WORDS[3], "--step-s", "0.1"]
+    program.write_text("G21 G90 G17 G94\nM5\nG0 X0 Y0 Z0\nG1 X2 F600\nM2\n")
+    said = []
+    for more in ([], ["-q"]):
+        assert run(["simulate", str(program), *words, *more]) == 0
+        said.append(capsys.readouterr())
+    assert said[0].out == said[1].out != ""
+    assert "spindle stopped" in said[0].err
+    assert said[1].err == ""
+
+
 def test_long_programs_say_how_far_they_are(tmp_path):
     program = tmp_path / "long.nc"
     moves = (f"G1 X{k % 97 / 10:.4f} Y{k % 89 / 10:.4f} F600" for k in range(45_000))
