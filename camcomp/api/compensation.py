@@ -159,7 +159,7 @@ def compensate_file(
                 write_all({output: data}, inputs=(program, *configs, *mirror))
             return None
         file.seek(0)
-        machine = job_of_program(machine, file, name, stock)
+        own = job_of_program(machine, file, name, stock)
         if not (paths or report or mirror):
             asked = CorrectionSettings(
                 method=method or settings.method,
@@ -168,9 +168,7 @@ def compensate_file(
                 arcs=arcs,
             )
             paths_out = OutputPaths(output, joints, summary)
-            done = compensate_long(
-                file, name, machine, asked, paths=paths_out, inputs=(program, *configs), dry_run=dry_run
-            )
+            done = compensate_long(file, name, own, asked, paths=paths_out, inputs=(program, *configs), dry_run=dry_run)
         if done is not None:
             return done
         data = file.read()

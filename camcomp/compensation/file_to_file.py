@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, BinaryIO
 
-from camcomp.compensation.program.result import Summary
+from camcomp.compensation.program.result import Summary, interpolation_failed
 from camcomp.compensation.report.joint_table import JointTable, joint_table
 from camcomp.ground.errors import ProgramError
 from camcomp.ground.files import writing
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from camcomp.compensation.long.totals import Totals
 
 LONG = 1 << 14  # bytes from which it pays to interpolate: some 500 lines
+MOST_EXACT = 1 << 20  # bytes up to which a program is solved point by point where its interpolation is not good enough
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,8 @@ def compensate_in_pieces(
     source: the program, seekable, at its start and left there on None. name: that of messages. program: receives the
     corrected program in order; on None what it received is void. joints: opens the joint table.
 
-    A program with a mistake is left to the reader of whole programs, which finds all of them. Raises CheckFailed CC603
+    A program with a mistake is left to the reader of whole programs, which finds all of them; one of up to MOST_EXACT bytes
+    whose interpolation fails its check is left to the exact way. Raises CheckFailed CC603
     for a program that was compensated before, and the errors of physics and files.
     """
     if not is_for_pieces(source, job, settings):
@@ -91,7 +93,9 @@ def compensate_in_pieces(
             raise  # only the stock raises it, and the other reader would raise it again
         source.seek(0)
         return None
-    return totals
+    failed = interpolation_failed(totals.interpolated) and source.seek(0, 2) <= MOST_EXACT
+    source.seek(0)
+    return None if failed else totals
 
 
 def compensate_long(

@@ -714,8 +714,9 @@ RULES: dict[str, Rule] = {
     "CC607": Rule(
         "interpolation",
         "Long programs are corrected by interpolation between exact solutions. Points of it, solved exactly at the end, "
-        "differ by more than they may; the outputs stand, and are not to be used.",
-        "cut the program into parts of less than 1 MB, which are solved point by point, and report the case",
+        "differ by more than they may; the outputs stand, and are not to be used. Programs of up to 1 MB are solved point by "
+        "point then.",
+        "cut the program into parts of less than 1 MB, and report the case",
     ),
     "CC608": Rule(
         "no program for a next experiment",

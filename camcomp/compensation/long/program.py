@@ -95,9 +95,7 @@ class LongProgram:
                 sink(data)
             self._told.result()
         self.totals.waiting_s = self._runs.waiting_s(self.job.config)
-        self.totals.finish(self._corrector, self._runs.warnings)
-        if self._stock is not None:
-            self.totals.warnings += self._stock.finish()
+        self.totals.finish(self._corrector, self._runs, [] if self._stock is None else self._stock.finish())
         return self.totals
 
     # --- order ---------------------------------------------------------------------------------------------------

@@ -31,6 +31,7 @@ from camcomp.model.control import waiting_s
 CHUNK_BYTES = 1 << 21  # bytes read at once
 RUN = 1 << 14  # motions of a plain run at most
 PROBE_MOTIONS = 48  # plain motions in a row that make a run of their own
+_PROGRAM = re.compile(rb"(?:^|[\r\n])[ \t]*[O:][ \t]*\d", re.IGNORECASE)
 _END = re.compile(END_OF_LINE.encode())
 
 
@@ -57,7 +58,7 @@ class InterpretedRun:
 
 @dataclass(eq=False, kw_only=True)
 class Runs:
-    """Cuts a program into runs. `warnings` grow while it is read."""
+    """Cuts a program into runs. `warnings` and `behind_end` (the program's end) grow while it is read."""
 
     source: BinaryIO
     name: str
@@ -65,6 +66,7 @@ class Runs:
     dialect: str | None
     top_mm: float = np.nan  # of the stock: where cutting begins
     warnings: list[str] = field(default_factory=list)
+    behind_end: list[str] = field(default_factory=list)
     motions: int = 0
 
     def __post_init__(self) -> None:
@@ -149,6 +151,8 @@ class Runs:
         moving = first = 0
         while True:
             data = self._data[self._at :].tobytes()
+            if self.language.flow == "macro" and _PROGRAM.search(data):
+                raise NotInPieces  # another program, which may be called or stand there by mistake
             lines = [row for row, line in enumerate(_END.split(data)) if has_motion(line.decode("latin-1"))]
             if lines:
                 moving, first = moving + len(lines), first or self._row + lines[0] + 1
@@ -158,7 +162,7 @@ class Runs:
             if not self._more():
                 break
         if moving:
-            self.warnings.append(behind_end_warning(self.name, moving, first))
+            self.behind_end.append(behind_end_warning(self.name, moving, first))
 
     # --- lines ---------------------------------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from camcomp.compensation.long.control_account import ControlAccount, SeenPoints
 from camcomp.compensation.long.engagement import path_of_run
 from camcomp.compensation.long.plain import CorrectedRun, PlainCorrector
 from camcomp.compensation.long.plain_run import PlainRun
+from camcomp.compensation.long.runs import Runs
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.result import (
     BOUND_UM,
@@ -23,10 +24,8 @@ from camcomp.compensation.program.result import (
     worse_than_before,
 )
 from camcomp.compensation.program.under_control import (
-    apart_warning,
+    control_warnings,
     mode_name,
-    rest_warning,
-    warnings_of,
     written_moves,
 )
 from camcomp.gcode.output import Part
@@ -185,7 +184,9 @@ class Totals:
         feed = np.where(np.isnan(path.feed), default, path.feed)
         before.add(moves_of(path, modes, feed, result.program.per_turn).take(mine))
         first = int(np.flatnonzero(own)[0])
-        moves = written_moves(result.program, result.rows, result.written, default).take(own)
+        moves = written_moves(result.program, result.rows, result.written, default)
+        moves = replace(moves, exact=moves.exact | control.rest).take(own)
+        self.resting += int(control.rest.sum())
         points = SeenPoints(control.row - first, control.told, result.missed, result.lines[control.row], control.joined)
         after.add(moves, points)
 
@@ -267,18 +268,20 @@ class Totals:
 
     # --- the end -------------------------------------------------------------------------------------------------
 
-    def finish(self, corrector: PlainCorrector, warnings: list[str]) -> None:
-        """Solves the sample exactly and keeps the largest differences."""
-        feeds = self._feeds.warnings()
-        if not (self._moved or feeds) and self._feeds.feeds:
-            feeds = [below_step_warning(self._feeds.name, self._feeds.feeds, self.step_mm)]
-        self.warnings = list(dict.fromkeys([*self.job.taken.remarks, *self._doubts.warnings(), *feeds, *warnings]))
-        self.warnings += rest_warning(self.resting)
+    def finish(self, corrector: PlainCorrector, runs: Runs, stock: list[str]) -> None:
+        """Collect the warnings, also those of the stock, solve the sample exactly, and keep the largest differences."""
         for each in self._control:
             each.finish()
-        self.warnings += warnings_of(tuple(self.modes), self._control[1].beside, self._control[1].elsewhere)
-        self.warnings += apart_warning(self.apart)
+        feeds, control = self._feeds.warnings(), self._control[1]
+        self.warnings = [*runs.warnings, *feeds, *runs.behind_end]
+        self.warnings += control_warnings(
+            tuple(self.modes), control.beside, control.elsewhere, exact_stop=runs.language.exact_stop,
+            resting=self.resting, apart=self.apart,
+        )  # fmt: skip
         self.warnings += spindle_warning(np.array(self._still, np.int64))
+        self.warnings += [*self.job.taken.remarks, *self._doubts.warnings(), *stock]
+        if not (self._moved or feeds) and self._feeds.feeds:
+            self.warnings.append(below_step_warning(self._feeds.name, self._feeds.feeds, self.step_mm))
         known, m = corrector.field, len(self.job.machine.actuators)
         if known is None or not self._sample:
             return

@@ -43,9 +43,6 @@ from camcomp.compensation.program.reversals import cut_at_reversals
 from camcomp.compensation.program.table_knots import cut_at_knots
 from camcomp.compensation.program.under_control import (
     UnderControl,
-    apart_warning,
-    merging,
-    rest_warning,
     rests,
     stays_apart,
     under_control,
@@ -58,7 +55,7 @@ from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.progress import part as part_of_work
 from camcomp.ground.source_lines import named_lines
-from camcomp.model.cutting.assumed import doubtful_force
+from camcomp.model.cutting.assumed import ForceDoubts
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import Track, lay_track
@@ -300,11 +297,11 @@ def _compensated(
         judged = points.judged
         refuse_unsolved(program, track, points.piece[judged], points.target[judged], seen.status[judged])
     still = np.intersect1d(cut_without_spindle(track), path.line[track.motion[feeding]])
-    rest = np.zeros(len(rows.piece), np.bool_) if part is not None else rests(program, rows, tolerance_um)
+    rest = rests(program, rows, tolerance_um, part)
     if rest.any():
         written = rewrite(
             program, output_of(path, rows, rest), resolution_mm=job.config.control.resolution_mm, version=version,
-            model=job.fingerprint,
+            part=part, model=job.fingerprint,
         )  # fmt: skip
     seen = replace(after, error=missed_by)
     control = under_control(program, job, rows=rows, written=written, points=points, after=seen, rest=rest)
@@ -320,14 +317,13 @@ def _compensated(
                     program, output_of(path, rows, rest, apart), resolution_mm=job.config.control.resolution_mm,
                     version=version, model=job.fingerprint,
                 )  # fmt: skip
-    warnings = _warnings(job, control.resting, program.language.exact_stop) + control.warnings(
-        path.line[track.motion[points.piece[points.judged]]], tolerance_um
-    )
-    if control.apart:
-        warnings += apart_warning(mode for mode in control.modes if merging(mode, program.language))
-    warnings += [*spindle_warning(still), *turns.warning()]
+    lines = path.line[track.motion[points.piece[points.judged]]]
+    warnings = _warm_up(job) + control.warnings(lines, tolerance_um, program.language)
+    warnings += [*turns.warning(), *spindle_warning(still)]
     if part is None:
-        warnings += [*job.taken.remarks, *doubtful_force(job.config, path)]
+        doubts = ForceDoubts(config=job.config)
+        doubts.add(path)
+        warnings += [*job.taken.remarks, *doubts.warnings()]
         warnings += stock_warnings(stock_remarks(job.config, path, track.engaged))
         if feeding.any() and kept[feeding].all():
             feeds = len(np.unique(track.motion[feeding]))
@@ -449,14 +445,12 @@ def _kept(track: Track, nodes: Nodes, correction: Floats, half: float) -> Bools:
     return out
 
 
-def _warnings(job: Job, resting: int, exact_stop: str) -> list[str]:
-    out = rest_warning(resting, exact_stop)
-    if job.config.process.temperature_C is None:
-        warm = dict.fromkeys(cause.name for cause in job.causes if getattr(cause.effect, "WARMS", False))
-        out += [
-            f"{name}: without process: temperature_C the machine counts as warming up from 20 deg C" for name in warm
-        ]
-    return out
+def _warm_up(job: Job) -> list[str]:
+    """Warnings of effects whose machine counts as warming up."""
+    if job.config.process.temperature_C is not None:
+        return []
+    warm = dict.fromkeys(cause.name for cause in job.causes if getattr(cause.effect, "WARMS", False))
+    return [f"{name}: without process: temperature_C the machine counts as warming up from 20 deg C" for name in warm]
 
 
 def _assemble(

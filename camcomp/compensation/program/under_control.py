@@ -16,7 +16,7 @@ import numpy as np
 from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.result import CycleTime, error_size
 from camcomp.gcode.dialect import Dialect
-from camcomp.gcode.output import Rewritten
+from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
@@ -58,12 +58,25 @@ class FarOff:
         return [f"{off}, at {lines}; a smaller tolerance of the path mode reduces it"]
 
 
-def warnings_of(modes: tuple[PathMode, ...], beside: FarOff, elsewhere: FarOff) -> list[str]:
-    """Warnings of contour errors next to joining lines and elsewhere; none unless all path modes were stated."""
-    if not all(each.stated for each in modes):
-        return []
-    mode = mode_name(modes)
-    return beside.told(mode, " next to joining lines") + elsewhere.told(mode, "")
+def control_warnings(
+    modes: tuple[PathMode, ...], beside: FarOff, elsewhere: FarOff, *, exact_stop: str, resting: int,
+    apart: Iterable[PathMode],
+) -> list[str]:  # fmt: skip
+    """Warnings about the controller.
+
+    Exact stops that were written because of joining lines (resting: how many), contour errors next to joining lines and
+    elsewhere where all path modes were stated, and codes that keep lines from being merged in the modes `apart`.
+    """
+    out = []
+    if resting:
+        where = f"at {resting} end{'s' if resting > 1 else ''} of cuts and joining lines"
+        out.append(f"{exact_stop} is written {where}: the controller stops there instead of rounding; nothing to do")
+    if all(each.stated for each in modes):
+        mode = mode_name(modes)
+        out += beside.told(mode, " next to joining lines") + elsewhere.told(mode, "")
+    if said := ", ".join(mode.apart.name for mode in distinct(apart)):
+        out.append(f"{said} is written around the cuts: the controller does not merge lines there; nothing to do")
+    return out
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -77,8 +90,13 @@ class UnderControl:
     joined: Bools  # (k,) beside a joining line
     row: Ints  # (k,) end point to which the move leads on which a point lies
     told: Floats  # (k, 3) mm, the points as commanded
-    resting: int = 0  # end points at which the control rests because of a joining line
+    rest: Bools  # (N,) end points at which the control rests because of a joining line
     apart: bool = False  # lines are kept from being made one
+
+    @property
+    def resting(self) -> int:
+        """Number of end points at which the control rests because of a joining line."""
+        return int(self.rest.sum())
 
     @property
     def stated(self) -> bool:
@@ -104,14 +122,15 @@ class UnderControl:
         size = np.linalg.norm(self.error[~self.joined], axis=1)
         return float(np.nanmax(size, initial=0.0))
 
-    def warnings(self, lines: Ints, tolerance_um: float) -> list[str]:
-        """Where the control goes further off than the tolerance; lines (k,): source lines of the errors."""
+    def warnings(self, lines: Ints, tolerance_um: float, language: Dialect) -> list[str]:
+        """Warnings about the controller; lines (k,): source lines of the errors."""
         size = 1e3 * np.linalg.norm(self.error, axis=1)
         found = []
         for of in (self.joined, ~self.joined):
             far = of & (size > tolerance_um * (1.0 + 1e-9))
             found.append(FarOff().with_more(lines[far], size[far]))
-        return warnings_of(self.modes, *found)
+        apart = [mode for mode in self.modes if self.apart and merging(mode, language)]
+        return control_warnings(self.modes, *found, exact_stop=language.exact_stop, resting=self.resting, apart=apart)
 
     def leaves_room(self, tolerance_um: float) -> bool:
         """Whether another way to write the program might be faster or nearer to the path."""
@@ -132,16 +151,19 @@ def rounds(mode: PathMode, tolerance_um: float) -> bool:
     return mode.stated and not mode.exact and not 0.0 < 1e3 * mode.tolerance_mm <= tolerance_um
 
 
-def rests(program: Program, rows: CorrectedRows, tolerance_um: float) -> Bools:
+def rests(program: Program, rows: CorrectedRows, tolerance_um: float, part: Part | None = None) -> Bools:
     """End points (N,) at which an exact stop keeps the corner of a cut and a joining line sharp.
 
-    Lines that set the path mode themselves are unchanged.
+    Lines that set the path mode themselves are unchanged, and so is the last end point of a part: what follows it is not
+    known to begin in the mode of the program.
     """
     modes = program.modes
     free = np.array([rounds(mode, tolerance_um) for mode in modes], bool)
     free[1:] &= np.array([a == b for a, b in pairwise(modes)], bool)
     cut = (rows.kind != RAPID) & ~rows.joining & rows.corrected
     out: Bools = rests_of(cut, rows.joining) & free[rows.motion]
+    if part is not None:
+        out &= (rows.motion >= part.first) & (np.append(rows.motion[1:], part.last) < part.last)
     return out
 
 
@@ -199,16 +221,8 @@ def under_control(
     error = after.error[judged] + plan.leaves_by(row, told)
     return UnderControl(
         before_s=before.duration_s, after_s=plan.duration_s, modes=distinct(program.modes[k] for k in cuts),
-        error=error, joined=beside, row=row, told=told, resting=int(rest.sum()), apart=apart is not None,
+        error=error, joined=beside, row=row, told=told, rest=rest, apart=apart is not None,
     )  # fmt: skip
-
-
-def rest_warning(resting: int, exact_stop: str = "G61") -> list[str]:
-    """Warning of exact stops that were written because of joining lines."""
-    if not resting:
-        return []
-    where = f"at {resting} end{'s' if resting > 1 else ''} of cuts and joining lines"
-    return [f"{exact_stop} is written {where}: the controller stops there instead of rounding; nothing to do"]
 
 
 def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um: float) -> bool:
@@ -223,14 +237,6 @@ def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um
         return False
     free = plan_of(replace(moves, merge=np.zeros(len(moves))), limits)
     return off(free) < 0.9 * off(merged) and free.duration_s < LOST_TIME * merged.duration_s
-
-
-def apart_warning(modes: Iterable[PathMode]) -> list[str]:
-    """Warning of codes that keep lines from being merged in these path modes."""
-    said = ", ".join(mode.apart.name for mode in distinct(modes))
-    return (
-        [f"{said} is written around the cuts: the controller does not merge lines there; nothing to do"] if said else []
-    )
 
 
 def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:

@@ -7,7 +7,6 @@ diameter; there the tool meets less than a slot.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -23,7 +22,10 @@ from camcomp.model.cutting.track import PLUNGE_SINE
 Engagement = Literal["stock", "stated", "none"]
 TWO_WAYS = "`workpiece: {stock: ...}` or `--stock program`"
 LEVEL_MM = 1e-3  # of height: moves within it stay at one depth
-MOST_SAMPLES = 20_000  # of a path in the step-over test
+MOST_SAMPLES = 20_000  # that the step-over test keeps
+MOST_AT_ONCE = 1_000_000  # samples of one part of a path
+LEVEL_STRETCH = 20.0  # passes of other heights are no neighbours
+TILE_DIAMETERS = 8.0  # edge of a tile of space, in diameters of the first tool
 SAMPLE_DIAMETERS = 0.5  # distance of samples along the path, in tool diameters
 STEP_OVER_DIAMETERS = (0.05, 0.9)  # distance of a neighbouring pass, in tool diameters: retraced paths are no step-over
 MIN_STEP_OVER_SHARE = 0.1  # of the samples, from which a warning is given
@@ -78,38 +80,24 @@ def _is_assumed(config: Config) -> bool:
     return config.workpiece.stock is None and config.process.force.model not in ("none", "table")
 
 
-def doubtful_force(config: Config, path: Path) -> list[str]:
-    """Warnings where the assumed force cannot hold: drills, ball tools, step-overs below the diameter, rapids at depth.
-
-    Empty where a stock gives the engagement or no force acts.
-    """
-    if not _is_assumed(config):
-        return []
-    doubts = ForceDoubts(config=config)
-    doubts.add(path)
-    out = doubts.warnings()
-    on = np.flatnonzero((path.kind != RAPID) & path.known & ~path.machine)
-    if share := _beside_share(path, on, doubts.cutters()):
-        out.append(
-            f"{100.0 * share:.0f} % of the feed path runs less than one tool diameter beside an earlier pass; "
-            f"the assumed force is too large there; {TWO_WAYS}"
-        )
-    return out
-
-
 @dataclass(eq=False, kw_only=True)
 class ForceDoubts:
-    """Tools of feed moves, and lateral rapids between cuts at their depth, found part by part of a path."""
+    """Where the assumed force cannot hold, found part by part of a path.
+
+    Drills, ball tools, step-overs below the diameter, lateral rapids between cuts at their depth; none of them where a
+    stock gives the engagement or no force acts.
+    """
 
     config: Config
     tools: set[int] = field(default_factory=set)
     lines: set[int] = field(default_factory=set)
+    _passes: Passes = field(default_factory=lambda: Passes())
     _flat: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))  # of the last two motions, as the next ones
     _cuts: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
     _line: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def add(self, path: Path) -> None:
-        """Examine the next motions of a path; without effect if a stock is known or the force is zero."""
+        """Examine the next motions of a path."""
         if not _is_assumed(self.config):
             return
         known, way, top = path.known & ~path.machine, path.end - path.start, self.config.workpiece.stock_top_mm
@@ -117,61 +105,90 @@ class ForceDoubts:
         cut = level & (path.kind != RAPID) & (True if top is None else path.end[:, 2] < top)
         flat = np.concatenate((self._flat, level & (path.kind == RAPID)))
         cuts, line = np.concatenate((self._cuts, cut)), np.concatenate((self._line, path.line))
-        self.tools |= set(np.unique(path.tool[known & (path.kind != RAPID)]).tolist())
+        feeds = np.flatnonzero(known & (path.kind != RAPID))
+        numbers, which = np.unique(path.tool[feeds], return_inverse=True)
+        self.tools |= set(numbers.tolist())
+        diameters = np.array([self._cutter(each).diameter_mm or 0.0 for each in numbers], float)
+        self._passes.add(path, feeds, diameters[which])
         self.lines |= set(line[1:-1][flat[1:-1] & cuts[:-2] & cuts[2:]].tolist())
         self._flat, self._cuts, self._line = flat[-2:], cuts[-2:], line[-2:]
 
-    def cutters(self) -> list[Cutter]:
-        """The tools of feed moves."""
-        return [self.config.tools.get(number, self.config.tool) for number in sorted(self.tools)]
+    def _cutter(self, number: int) -> Cutter:
+        return self.config.tools.get(number, self.config.tool)
 
     def warnings(self) -> list[str]:
-        """One warning per form of tool that is no flat mill, and one with the source lines of the rapids."""
+        """One warning per form of tool that is no flat mill, one with the source lines of the rapids, one on step-overs."""
         out = [
             f"the assumed force is that of a flat end mill, and the tool is a {kind}; {TWO_WAYS}"
-            for kind in sorted({str(each.type) for each in self.cutters()} & {"ball", "drill"})
+            for kind in sorted({str(self._cutter(each).type) for each in self.tools} & {"ball", "drill"})
         ]
-        if not self.lines:
-            return out
-        where = f"G0 at cutting depth between two cuts at {named_lines(sorted(self.lines))}"
-        return [
-            *out,
-            f"{where}: the model has no force there, and the machine may cut at rapid speed; retract, or state the stock",
-        ]
+        if self.lines:
+            where = f"G0 at cutting depth between two cuts at {named_lines(sorted(self.lines))}"
+            out.append(
+                f"{where}: the model has no force there, and the machine may cut at rapid speed; retract, or state the stock"
+            )
+        if (share := self._passes.beside_share()) > MIN_STEP_OVER_SHARE:
+            out.append(
+                f"{100.0 * share:.0f} % of the feed path runs less than one tool diameter beside an earlier pass; "
+                f"the assumed force is too large there; {TWO_WAYS}"
+            )
+        return out
 
 
-def _beside_share(path: Path, on: Ints, cutters: Sequence[Cutter]) -> float:
-    """Share of the lateral feed path (motions `on`) next to an earlier pass of the same height; 0 below MIN_BESIDE_SHARE."""
-    diameter = min((each.diameter_mm for each in cutters if each.diameter_mm), default=None)
-    if diameter is None or not len(on):
-        return 0.0
-    point, along = _samples(path, on, SAMPLE_DIAMETERS * diameter)
-    if len(point) < 2:
-        return 0.0
-    from scipy.spatial import cKDTree  # not needed by most runs, and slow to import
+@dataclass(eq=False)
+class Passes:
+    """Samples of the lateral feed path, at most MOST_SAMPLES: beyond those, of every second tile of space, and so on."""
 
-    near, far = (share * diameter for share in STEP_OVER_DIAMETERS)
-    scaled = point * [1.0, 1.0, 20.0]  # passes of other heights are no neighbours
-    pairs = cKDTree(scaled).query_pairs(far, output_type="ndarray")
-    apart = np.linalg.norm(scaled[pairs[:, 0]] - scaled[pairs[:, 1]], axis=1)
-    way = np.abs(along[pairs[:, 0]] - along[pairs[:, 1]])
-    beside = np.unique(pairs[(apart > near) & (way > 3.0 * diameter)].max(axis=1)) if len(pairs) else np.zeros(0)
-    share = len(beside) / len(point)
-    return share if share > MIN_STEP_OVER_SHARE else 0.0
+    point: Floats = field(default_factory=lambda: np.zeros((0, 3)))  # (k, 3) mm; heights stretched by LEVEL_STRETCH
+    along: Floats = field(default_factory=lambda: np.zeros(0))  # (k,) path length in samples
+    diameter: Floats = field(default_factory=lambda: np.zeros(0))  # (k,) mm, of the tool
+    _length: float = 0.0  # of the path so far, in samples
+    _every: int = 1  # one tile of so many is kept
 
+    def add(self, path: Path, on: Ints, diameter: Floats) -> None:
+        """Sample the lateral ones of the next motions `on` (n,) of a path; diameter (n,) mm, 0: not known."""
+        length = path_geometry.lengths(path)[on]
+        rise = np.abs(path.end[on, 2] - path.start[on, 2])
+        lateral = (diameter > 0.0) & (rise < (1.0 - PLUNGE_SINE) * length) & (rise < 0.5 * length)
+        on, diameter = on[lateral], diameter[lateral]
+        count = length[lateral] / (SAMPLE_DIAMETERS * diameter)
+        ends = self._length + np.cumsum(count)
+        if not len(on):
+            return
+        first = np.floor(self._length + 0.5) + 0.5
+        at = np.arange(first, ends[-1], max(1.0, np.ceil(count.sum() / MOST_AT_ONCE)))
+        self._length = float(ends[-1])
+        which = np.minimum(np.searchsorted(ends, at), len(on) - 1)
+        u = np.clip(1.0 - (ends[which] - at) / count[which], 0.0, 1.0)
+        self.point = np.concatenate((self.point, path_geometry.points(path, on[which], u) * [1.0, 1.0, LEVEL_STRETCH]))
+        self.along, self.diameter = np.append(self.along, at), np.append(self.diameter, diameter[which])
+        self._thin()
 
-def _samples(path: Path, on: Ints, step: float) -> tuple[Floats, Floats]:
-    """Points (k, 3) mm along the lateral ones of motions `on`, and the path length (k,) mm up to each."""
-    length = path_geometry.lengths(path)[on]
-    rise = np.abs(path.end[on, 2] - path.start[on, 2])
-    lateral = (length > 0.0) & (rise < 0.5 * length) & (rise < (1.0 - PLUNGE_SINE) * np.maximum(length, 1e-12))
-    on, length = on[lateral], length[lateral]
-    total = float(length.sum())
-    if not total > 0.0:
-        return np.zeros((0, 3)), np.zeros(0)
-    at = np.arange(0.5 * step, total, max(step, total / MOST_SAMPLES))
-    ends = np.cumsum(length)
-    which = np.searchsorted(ends, at)
-    which = np.minimum(which, len(on) - 1)
-    u = (at - (ends[which] - length[which])) / length[which]
-    return path_geometry.points(path, on[which], np.clip(u, 0.0, 1.0)), at
+    def _thin(self) -> None:
+        """Leave out tiles until the samples are few enough; that of the first sample is always kept."""
+        if len(self.along) <= MOST_SAMPLES and self._every == 1:
+            return
+        size = TILE_DIAMETERS * self.diameter[0]
+        tile = np.rint((self.point - self.point[0]) / size).astype(np.int64)
+        mixed = (tile * [73_856_093, 19_349_663, 83_492_791]).sum(axis=1)
+        mixed ^= mixed >> 13
+        while (kept := mixed % self._every == 0).sum() > MOST_SAMPLES and self._every < 1 << 40:
+            self._every *= 2
+        self.point, self.along, self.diameter = self.point[kept], self.along[kept], self.diameter[kept]
+
+    def beside_share(self) -> float:
+        """Share of the lateral feed path next to an earlier pass of the same height by this or a wider tool."""
+        beside = np.zeros(len(self.along), np.bool_)
+        if len(beside) < 2:
+            return 0.0
+        from scipy.spatial import cKDTree  # not needed by most runs, and slow to import
+
+        for each in np.unique(self.diameter):
+            of = np.flatnonzero(self.diameter >= each)
+            near, far = (share * each for share in STEP_OVER_DIAMETERS)
+            pairs = of[cKDTree(self.point[of]).query_pairs(far, output_type="ndarray")]
+            first, later = pairs.min(axis=1), pairs.max(axis=1)
+            apart = np.linalg.norm(self.point[first] - self.point[later], axis=1)
+            own = (self.diameter[later] == each) & (apart > near)
+            beside[later[own & (self.along[later] - self.along[first] > 3.0 / SAMPLE_DIAMETERS)]] = True
+        return float(self.diameter[beside].sum() / self.diameter.sum())

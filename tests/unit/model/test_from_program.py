@@ -177,7 +177,7 @@ RAPID_CUTS = "G21 G90\nS8000 M3\nG0 X0 Y0 Z5\nG1 Z-1 F300\nG1 X10 F600\nG0 X20\n
 )
 def test_a_rapid_at_cutting_depth_is_warned_of(tmp_path, more, text, lines):
     warned = [each for each in compensate(text.encode(), machine(tmp_path, more)).summary.warnings if "G0" in each]
-    assert len(warned) == (lines is not None) and all(f"source lines {lines}:" in each for each in warned)
+    assert len(warned) == (lines is not None) and all(f"source line {lines}:" in each for each in warned)
 
 
 @pytest.mark.parametrize("kind", ["ball", "drill"])

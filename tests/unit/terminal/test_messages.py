@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from camcomp.api import diagnosis
-from camcomp.compensation.program.under_control import rest_warning
+from camcomp.compensation.program.under_control import FarOff, control_warnings
 from camcomp.compensation.report.page import _caution
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.files import shipped
@@ -18,6 +18,11 @@ from camcomp.terminal.commands.compensate import _either
 
 CARTESIAN = ("--config", str(shipped("config/cartesian.yaml")))
 SQUARE = "G21 G90 G17 G94\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X10 F600\nG1 Y10\nX0\nY0\nG0 Z5\nM30\n"
+
+
+def resting(count):
+    """Warnings about exact stops at so many ends."""
+    return control_warnings((), FarOff(), FarOff(), exact_stop="G61", resting=count, apart=())
 
 
 @pytest.fixture
@@ -94,12 +99,12 @@ def test_rounding_errors_of_zero_are_printed_as_zero():
 
 
 def test_exact_stops_that_were_written_need_no_action():
-    (said,) = rest_warning(1)
+    (said,) = resting(1)
     assert (
         said
         == "G61 is written at 1 end of cuts and joining lines: the controller stops there instead of rounding; nothing to do"
     )
-    assert "at 2 ends" in rest_warning(2)[0] and rest_warning(0) == []
+    assert "at 2 ends" in resting(2)[0] and resting(0) == []
 
 
 def test_messages_name_one_line_in_the_singular_and_at_most_ten():
@@ -108,7 +113,7 @@ def test_messages_name_one_line_in_the_singular_and_at_most_ten():
 
 
 def test_warnings_that_need_no_action_are_notes():
-    assert _figures.warning_lines([*rest_warning(1), "cut"])[0].startswith("note: G61 is written at 1 end")
+    assert _figures.warning_lines([*resting(1), "cut"])[0].startswith("note: G61 is written at 1 end")
     assert _figures.warning_lines(["cut"]) == ["warning: cut"]
 
 
