@@ -63,7 +63,7 @@ from camcomp.model.motion.twin import Twin
 ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
 MOSTLY_ONE_ACTUATOR = 0.6  # share of what is unknown from which on it is one actuator's
 VIBRATION_SHARE = 0.4  # of the gap in one line of the spectrum
-UNTESTED = 0.1  # of the leader's probability: what a set that explains alike counts as at least
+UNTESTED = 0.1  # of the leader's probability: the least that a set that explains as well counts as
 LEAST_DRIVER = 0.02  # share of what is left, below which nothing is a driver
 MOST_ALTERNATIVES = 4  # sets that are listed (contract, section 6)
 UNLOGGED_RISE = (0.3, 3.0)  # times the 10 K that are taken where no temperature is logged: by how much drives warm up
@@ -141,9 +141,9 @@ def _proposed(proposal: Proposal) -> NextExperiment:
 
 
 def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal | None:
-    """What separates the answer from its rivals: those that explain alike, or else those that are not yet excluded.
+    """The experiment that separates the answer from its rivals: sets that explain as well, or else those not yet excluded.
 
-    Where nothing rivals it, what narrows the error that its uncertainty leaves on the runs' programs.
+    Without a rival, the one that reduces the error by its uncertainty on the runs' programs.
     """
     if word == "none":
         return None
@@ -155,7 +155,7 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
         close += [j for j in np.argsort(-found.probability) if j != best][:3]
     p = found.probability[close]
     if found.verdict.rivals:
-        p = np.maximum(p, UNTESTED * p.max())  # alike by construction: their prior is no reason to leave them untested
+        p = np.maximum(p, UNTESTED * p.max())  # they explain equally well: a low prior does not exclude them
     fits = [found.fits[j] for j in close]
     proposal = propose(problem, fits, p / p.sum(), job)
     return None if proposal is None else with_outcomes(proposal, [_set_name(problem, f) for f in fits])

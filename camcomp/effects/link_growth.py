@@ -23,7 +23,7 @@ PARAMETERS = (
 
 
 def applies(robot: Robot, target: str | None) -> bool:
-    """Whether a link stands behind a hinge: behind a slide its growth looks like that of the drive (thermal_growth)."""
+    """Whether a link stands behind a hinge: behind a slide its growth equals that of the drive (thermal_growth)."""
     hinges = {each.name for each in robot.actuators if each.revolute}
     return target in hinges and link_of(robot, target) is not None
 

@@ -1,6 +1,6 @@
 """A warming screw grows along the length in use: carriage minus encoder is proportional to temperature and way from home.
 
-What lies between the fixed bearing and home grows alike wherever the nut is: that part is thermal_growth.
+The screw between the fixed bearing and home grows by the same length wherever the nut is: that part is thermal_growth.
 """
 
 from collections.abc import Mapping

@@ -200,8 +200,8 @@ RULES: dict[str, Rule] = {
     ),
     "CC141": Rule(
         "no NC program",
-        "Hardly a line of the file looks like one of an NC program. Nothing of it is shown, for it may be a file that was "
-        "never meant to be read aloud.",
+        "Hardly a line of the file has the form of an NC program. Its text is not shown, because it may be "
+        "confidential.",
         "is this the right file? YAML files have to end in .yaml or .yml",
     ),
     "CC142": Rule(
@@ -314,8 +314,8 @@ RULES: dict[str, Rule] = {
     ),
     "CC218": Rule(
         "no file of camcomp",
-        "None of the sections of a machine file or of an experiment stands in the file. Nothing of it is shown, for it may "
-        "be a file that was never meant to be read aloud.",
+        "None of the sections of a machine file or of an experiment stands in the file. Its text is not shown, because it may "
+        "be confidential.",
         "check the path; `camcomp init DIR` writes a machine file",
     ),
     "CC219": Rule(
@@ -400,7 +400,7 @@ RULES: dict[str, Rule] = {
     ),
     "CC264": Rule(
         "point outside the force table",
-        "The program cuts at a point for which the table says nothing; a force is not made up.",
+        "The program cuts at a point that the table does not cover; a force is not extrapolated.",
         "extend the table; a row of zeros says that there is no force",
     ),
     "CC265": Rule(
@@ -518,7 +518,7 @@ RULES: dict[str, Rule] = {
     "CC306": Rule(
         "result not finite",
         "The model answered with NaN or infinity. An effect, a force model or a value of the machine file leads out of what "
-        "can be computed; nothing is written, for such a number looks like none at all in a mean or a maximum.",
+        "can be computed; no file is written, because means and maxima would hide such a number.",
         "look at the plug-ins and effects named, and at values far from those of real machines",
     ),
     # --- CC4xx logs, experiments -------------------------------------------------------------------------------
@@ -565,7 +565,7 @@ RULES: dict[str, Rule] = {
     ),
     "CC409": Rule(
         "log too short",
-        "A run of a program has at least ten rows; fewer say nothing about their own noise.",
+        "A run of a program has at least ten rows; fewer do not determine their noise.",
         "log the whole run, some hundred rows",
     ),
     "CC410": Rule(

@@ -28,7 +28,7 @@ ENDURED = 0.05  # at the highest degree; worse: every point is solved
 MOST_LEVERAGE = 1.5  # of a point that is interpolated; the points of the fit have 1 at most
 LONE = 0.02  # of the points may be solved by themselves before the fit is made anew
 FEW = 0.005  # of the points may be left to that by a new fit
-EXTENSIONS, EXTENSION = 6, 40  # times that a fit learns so many more points where it says nothing
+EXTENSIONS, EXTENSION = 6, 40  # times that a fit learns so many more points where it has no answer
 TRIAL_FORCE_N = 1.0  # to find the compliance, beside a hundredth of the largest force
 
 
@@ -205,7 +205,9 @@ class _Fit:
         nothing = np.zeros((0, 0))
         blank = _Fit(0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-9), _exponents(degree), nothing, nothing)
         u, size, v = np.linalg.svd(blank.terms(points), full_matrices=False)
-        inverse = 1.0 / np.maximum(size, 1e-6 * size[0])  # what the points say nothing about has a large leverage
+        inverse = 1.0 / np.maximum(
+            size, 1e-6 * size[0]
+        )  # directions that the points do not determine have a large leverage
         solved = np.where(size > 1e-6 * size[0], inverse, 0.0)
         coefficients: Floats = v.T @ (solved[:, None] * (u.T @ values))
         return _Fit(blank.middle, blank.half, blank.exponents, coefficients, v.T * inverse)

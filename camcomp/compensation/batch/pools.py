@@ -114,7 +114,7 @@ def on_a_cluster(tasks: Iterable[Task], address: str, tell: Callable[[str], None
 
     Programs and configuration travel with the tasks, and results come back, so that no common disk is needed. tell: takes
     a line for the user; without a worker it is used after PATIENCE, and the tasks wait. Raises ConfigError CC216 when Dask
-    is not installed, FileError CC503 when nobody answers or the scheduler goes away, CC505 when a worker has another
+    is not installed, FileError CC503 when the scheduler does not answer or goes away, CC505 when a worker has another
     camcomp.
     """
     try:
@@ -131,7 +131,7 @@ def on_a_cluster(tasks: Iterable[Task], address: str, tell: Callable[[str], None
     try:
         yield from _Cluster(client, address, tell).outcomes(iter(tasks))
     finally:
-        with suppress(Exception):  # there may be nobody left to say goodbye to
+        with suppress(Exception):  # the scheduler may be gone
             client.close(timeout=2)
 
 
@@ -177,7 +177,7 @@ class _Cluster:
             CancelledError,
             asyncio.CancelledError,
             OSError,
-        ) as error:  # nobody else cancels; who knew of it is gone
+        ) as error:  # only the scheduler cancels, when it goes away
             raise self._gone() from error
         except Exception as error:  # noqa: BLE001 - the cluster's, not the task's: `work` never raises
             self._workers()

@@ -45,7 +45,7 @@ class Reader:
         self._started = False  # a line has come
         self._refusing = False  # a header could not be used
         self._use([each.strip() for each in columns.split(",")] if columns is not None else [*NEEDED, TIME])
-        self._short = 6 if columns is None else self._count  # time may be left out when nobody has named it
+        self._short = 6 if columns is None else self._count  # time may be left out where no columns are named
 
     def read(self, line: bytes) -> SetPoint | None:
         """The set-point of a line with its end; None for a header. Raises ConfigError CC270 for anything else."""

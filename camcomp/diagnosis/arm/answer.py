@@ -425,8 +425,8 @@ def next_experiment(told: AnswerInputs, word: str) -> NextExperiment | None:
                 "intervals become narrower."
             ),
             (
-                "If they leave more, and the curves of the joints explain it once these poses are fitted, it was the angles "
-                "that nobody had seen."
+                "If they leave more, and the curves of the joints explain it once these poses are fitted, the first poses "
+                "lacked those angles."
             ),
             "If they leave as much after that, what is unknown does not go by the angle of one joint.",
         ),
@@ -444,8 +444,8 @@ def _second_campaign(told: AnswerInputs, q: Floats, place: Floats) -> NextExperi
         separates=tuple(effects),
         gain=round(float(np.log2(len(sets) + 1)), 4),
         outcomes=(
-            *(f"If {one} alone foretell the new poses, they are the cause." for one in sets[:2]),
-            "If no set foretells them, something unknown is at work.",
+            *(f"If {one} alone predict the new poses, they are the cause." for one in sets[:2]),
+            "If no set predicts them, the cause is not in the library.",
         ),
         poses=_listed(told, q, place) if len(q) else None,
     )

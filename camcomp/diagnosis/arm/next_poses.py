@@ -90,7 +90,7 @@ class _Belief:
 def candidates(bench: ArmBench, count: int = CANDIDATES) -> Floats:
     """Postures (n, m) inside the limits of the joints whose platform stands in the box that measured ones span.
 
-    Fewer where few of what is drawn stand there; the seed is fixed. Nobody here knows of collisions.
+    Fewer where few of the drawn postures stand there; the seed is fixed. Collisions are not checked.
     """
     rng = np.random.default_rng(POSES_SEED)
     drives = bench.robot.actuators

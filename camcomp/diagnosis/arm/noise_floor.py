@@ -99,7 +99,7 @@ def far_off(size: Floats, time: Floats) -> np.ndarray:
 
 def _stated(robot: Robot, campaigns: Sequence[Poses], stated: StatedDeviation) -> TipFloor | None:
     """Columns of deviations where there are any, the experiment's where it states more; every pose has to have one."""
-    slides = sum(not a.revolute for a in robot.actuators)  # a length says nothing of a hinge's encoder
+    slides = sum(not a.revolute for a in robot.actuators)  # lengths do not apply to a hinge's encoder
     squares = []
     for each in campaigns:
         own = np.full((len(each.q), 3), np.nan) if each.sd is None else each.sd

@@ -1,4 +1,4 @@
-"""Whether poses can be those of the arm: what cannot is refused before anything is fitted, with what it looks like."""
+"""Reject poses whose units, columns or rows cannot belong to this arm, and say what they look like."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ _UNSEEN = ("time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_
 class Poses:
     """Poses of one campaign: joints q (n, m), measured tips (n, 3) mm, time (n,) s, temperature (n,) or None, run (n,).
 
-    sd (n, 3) mm: what the instrument states of itself, NaN or None where it says nothing; row (n,): of the run's log, from 1;
+    sd (n, 3) mm: as stated by the instrument, NaN or None where it states none; row (n,): of the run's log, from 1;
     approach (n, m): direction in which every joint turned last, +1 or -1, 0 where unknown; torque (n, m) of the drives as
     logged, N mm or N, NaN or None where there is none; force (n, 3) N on the tool as a dynamometer measured it, machine
     frame, None without one.
@@ -198,7 +198,7 @@ class ArmBench:
         """Parameters of drives and links that need an unknown shape (a time of warming up), one column for each value to try."""
         found: list[Column] = []
         if not self._warm and not all(each.has_clock for each in self.campaigns):
-            return found  # rows without a clock say nothing of a warming curve
+            return found  # rows without a clock have no warming curve
         for name, module in shelf.usable("effects", (*_UNSEEN, CURVE, *without)):
             if not (hasattr(module, "on_drive") or hasattr(module, "on_links")) or module.TARGET == "named":
                 continue
@@ -362,7 +362,7 @@ def wave(column: Column, angle: Floats) -> Floats:
 def approached(q: Floats, time: Floats, least: float = 1e-4) -> Floats:
     """Way (n, m), +1 or -1, in which joints q (n, m) turned last when a log stopped in them; 0 where it does not show.
 
-    Taken as straight from row to row; turns below `least` rad (mm) are none. Rows without an order say nothing.
+    Taken as straight from row to row; reversals below `least` rad (mm) are ignored. Rows without an order have none.
     """
     out = np.zeros_like(q)
     order = np.argsort(time, kind="stable")

@@ -1,6 +1,6 @@
 """Where a tracker stands and where its target sits: frame and tool vector that bring an arm's poses onto measured points.
 
-Nobody knows either better than by this fit, so both are nuisances of a campaign and never causes.
+Both are known by this fit alone, so they are nuisances of a campaign and never causes.
 """
 
 from __future__ import annotations

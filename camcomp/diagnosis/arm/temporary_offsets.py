@@ -14,8 +14,8 @@ from camcomp.ground.datatypes import Floats
 
 EFFECT = "disturbance"
 SHORTEST = 4  # poses: fewer are outliers
-LONGEST = 0.7  # of a campaign's poses: beyond, what is left out is the spell
-LEAST_FREE = 0.02  # of a spell's squares that frames have to leave
+LONGEST = 0.7  # of a campaign's poses: a temporary offset lasts at most so long
+LEAST_FREE = 0.02  # of a temporary offset's squares that frames have to leave
 STEP = 256  # begins that are looked at together
 
 

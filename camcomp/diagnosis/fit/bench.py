@@ -85,7 +85,7 @@ class Run:
     clock: str | int | None
     thin: int = 1
     by: str = "setpoint"  # the channel that is the motion
-    unsure: Bools | None = None  # (n,) rows whose tip says nothing
+    unsure: Bools | None = None  # (n,) rows without a usable tip
     program: Path | None = None  # what the control was given
     turn: Floats | None = None  # (n, 3, 3) program axes to along and across the path, where the tip is the motion
 
@@ -179,7 +179,7 @@ class Bench:
     def observed(self, k: int) -> Floats:
         """Channels (n, c) as measured in run k.
 
-        NaN where missing, where nobody knows what was asked for or how the force stood, and in the channel that is the
+        NaN where missing, where set-point or force are unknown, and in the channel that is the
         motion itself.
         """
         run, m = self.runs[k], self.runs[k].measured

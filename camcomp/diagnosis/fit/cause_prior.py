@@ -8,7 +8,7 @@ from camcomp.diagnosis.statistics.cause_sets import CausePrior
 
 
 def cause_prior(columns: Columns) -> CausePrior:
-    """Prior weights: every effect alike; within an effect one value for all weighs half, or all targets alike."""
+    """Prior weights: every effect weighs the same; within an effect one value for all weighs half, or all targets the same."""
     candidates = columns.candidates  # what follows outlives these columns, which are large
     names = sorted({a.name for a in candidates})
     weight = []

@@ -62,7 +62,7 @@ def candidate_causes(robot: Robot, without: Sequence[str] = ()) -> list[Candidat
 
 
 def working_causes(bench: Bench, candidates: Sequence[CandidateCause]) -> list[CandidateCause]:
-    """Candidates without those effects of the user's own that fail on these runs: nobody named them, so nobody loses."""
+    """Candidates without those effects of the user's own that fail on these runs; the machine file does not name them."""
     failed: set[str] = set()
     for each in candidates:
         if each.name in failed or shelf.is_own("effects", each.name):
@@ -214,9 +214,9 @@ def healthy_sizes(
 
 
 def tip_um(bench: Bench, per_run: Sequence[Floats]) -> float:
-    """How far (rms over rows of all runs, um) changes of the channels (n, c) per run move the tip.
+    """Rms (um, over rows of all runs) by which changes of the channels (n, c) per run move the tip.
 
-    What encoders see moves it too, although a model that follows logged encoders says nothing of it.
+    Changes at encoders count, although a model that follows logged encoders does not contain them.
     """
     whole = sum(float(np.sum(moved_tip(bench, k, each[:, :, None]) ** 2)) for k, each in enumerate(per_run))
     return 1e3 * float(np.sqrt(whole / max(sum(map(len, per_run)), 1)))

@@ -31,7 +31,7 @@ def gap_sizes(problem: Problem, f: Fitted, members: Members = ()) -> Floats:
     every = dict(zip(f.members, problem.causes(f.members, f.theta, f.extra), strict=True))
     known = [every[i] for i in members]
     gaps = [problem.bench.gap(k, of_labels + known)[:, part] for k, of_labels in enumerate(_label_causes(problem, f))]
-    # an axis that nobody measured is no reason to do without the others
+    # the gap is formed from the axes that were measured
     size = np.concatenate(
         [np.where(np.isfinite(g).any(axis=1), np.sqrt(np.nansum(g**2, axis=1)), np.nan) for g in _together(gaps)]
     )

@@ -71,7 +71,7 @@ def best_shape(
     if gains is None:
         return None
     best = int(np.argmax(gains))
-    # between its neighbours the gain has one peak, and a large effect off its peak leaves what looks like noise
+    # between its neighbours the gain has one peak, and a large effect off its peak leaves a residual like noise
     near = np.geomspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], _FINER)
     finer = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in near], reduced, whitened)
     value = near[int(np.argmax(finer))] if finer is not None and finer.max() > gains[best] else values[best]

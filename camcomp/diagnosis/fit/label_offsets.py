@@ -16,7 +16,7 @@ from camcomp.model.motion.twin import Twin
 SETTLED_S = 1e-5  # change of a clock that needs no further pass
 PASSES = 5
 STEP_S = 1e-4  # in which a tip moves in one direction
-MOVING_MM_PER_S = 1.0  # a slower row says nothing about clocks
+MOVING_MM_PER_S = 1.0  # a slower row does not determine clocks
 
 
 def with_clocks(twin: Twin, runs: Sequence[Run]) -> list[Run]:

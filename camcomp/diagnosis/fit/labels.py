@@ -1,4 +1,4 @@
-"""Labels of clampings and clocks: what they differ by is nobody's fault, what all of them have in common is a cause.
+"""Labels of clampings and clocks: their differences are nuisances, their common part is a cause.
 
 Runs without a label share one clamping and one clock, and labels differ from it. Where every run has a label there is
 nothing to differ from: then labels scatter about what they have in common, by as much as they are seen to.

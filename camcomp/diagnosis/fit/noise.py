@@ -52,7 +52,7 @@ def less_certain(noise: Noise, extra: Sequence[Floats], heavy: Sequence[Floats])
 
 
 def inflation(bench: Bench) -> list[Floats]:
-    """Per run (n, c) >= 1: rows just after a step of the acceleration, or of which nobody knows what came before, count less; NaN where no value.
+    """Per run (n, c) >= 1: rows just after a step of the acceleration or after an unknown motion count less; NaN where no value.
 
     In units of the channel's own noise, which is not known yet: here the extra standard deviation in mm or N.
     """
@@ -68,7 +68,7 @@ def inflation(bench: Bench) -> list[Floats]:
             slope = np.abs(bench.twin.rotation.T @ place.of(bench.slopes[k].tip_rho))
             m = len(bench.actuators)
             of_drives = TIMING_S**2 * change + unseen_speeds[k]
-            # a tip that was read between the rows stands where nobody saw the speed change
+            # a tip read between the rows may lie at a speed that the rows lack
             unseen = run.run_path.between_s * float(np.median(np.diff(t))) * BETWEEN_ROWS
             extra[:, :3] = np.einsum("nij,nj->ni", slope, of_drives + unseen * change)
             extra[:, 3 : 3 + m] = of_drives
@@ -81,7 +81,7 @@ def inflation(bench: Bench) -> list[Floats]:
 
 
 def less_certain_drives(bench: Bench, noise: Noise) -> list[Floats]:
-    """Per run (n, m) >= 1: where nobody saw a drive that is late change its speed, its encoder says less of where it stands."""
+    """Per run (n, m) >= 1: encoders of drives with a lag are less certain where the rows lack a change of speed."""
     m = len(bench.actuators)
     unseen = [thinned(each, run.thin) for each, run in zip(_unseen_speeds(bench), bench.runs, strict=True)]
     return [np.sqrt(1.0 + (e / s[3 : 3 + m]) ** 2) for e, s in zip(unseen, noise.sigma, strict=True)]

@@ -79,7 +79,7 @@ def _sprung_off(gap: Floats) -> Bools:
 
 
 def _as_the_tip_says(bench: Bench, k: int, gap: Floats, odd: Bools) -> Bools:
-    """Cells (n, c) of encoders that lie far from their neighbours, odd (n, c), where the tip went along: two instruments do not err alike.
+    """Cells (n, c) of encoders that lie far from their neighbours, odd (n, c), where the tip moved, too: two instruments do not make the same error.
 
     gap (n, c): measured minus nominal. What is far behind in rapids is so for few rows.
     """

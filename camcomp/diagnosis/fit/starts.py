@@ -28,7 +28,7 @@ ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
 STARTING_ROWS = 2
 SWING_S = 0.03  # times the speed with which a log begins: how far a loop may then stand from where it is told
 SWINGS_S = 0.06  # in which that dies away: loops of 5 to 60 Hz as they are tuned
-BEGUN_ANEW = 3.0  # usual steps between rows from which on nobody knows how a loop came to the next one
+BEGUN_ANEW = 3.0  # usual steps between rows from which on a loop's state at the next row is unknown
 
 
 def start_columns(
@@ -104,10 +104,10 @@ def _swing(time: Floats, rho: Floats) -> Floats:
 
 
 def _standing(rho: Floats, revolute: bool) -> tuple[Bools, Bools]:
-    """Rows (n,) in which an actuator at rho (n,) has its play not yet taken up: those that are alike, and those on its way.
+    """Rows (n,) in which an actuator at rho (n,) has its play not yet taken up: those with one common state, and those on its way.
 
-    On its way its carriage begins to follow somewhere, which no row beside it tells. Where that takes many rows they are alike:
-    the way from one to the next is little.
+    On its way its carriage begins to follow at an unknown point. Where that takes many rows they share one state: the way
+    from one to the next is short.
     """
     moved = np.maximum.accumulate(np.abs(rho - rho[0]))
     still = moved < (STARTED_RAD if revolute else STARTED_MM)

@@ -99,7 +99,7 @@ class _Search:
             return None
         chosen = self._exhaustive(chosen, pool, score)
         chosen = self._without_idle(chosen)
-        # runs say nothing of what acts in one of them alone
+        # cross-validation by runs cannot test terms that act in one of them alone
         self.folds = self.base(ALTERNATING if any(t.form.passing for t in chosen) else self.split, False)
         return self._answer(self._with_constants(chosen), pool)
 

@@ -79,7 +79,7 @@ class Shapes:
         return Term(term.spot, best)
 
     def _between_runs(self, step: Folds, term: Term) -> Term:
-        """A swing in time by how many turns it does between runs, too: all that turn alike while runs last are tried."""
+        """An oscillation in time, by its number of turns between runs: all periods with the same turns within runs are tried."""
         size = self.bench.sizes(term.spot)
         low, high = size.limits["common_s"]
         longest = max(b - a for a, b in size.stretches)

@@ -42,7 +42,7 @@ SHOWN = 1e-12  # probability of a set that is kept
 class KnownNoise:
     """How well the noise of the groups is known: freedom, the number of values it rests on, infinite where it is stated.
 
-    None in place of it: unknown, so that its size says nothing of what is unmodelled.
+    None in place of it: unknown, so that unmodelled terms cannot be seen by the size of the residual.
     """
 
     freedom: float = np.inf

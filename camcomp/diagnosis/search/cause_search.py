@@ -135,7 +135,7 @@ def _with_answer(problem: Problem, weighed: _Weighed, known: Fitted) -> _Weighed
 def _state(weighed: _Weighed, beside: _Beside) -> Verdict:
     """The verdict with calibrated probabilities: of a cause that all sets have and that nothing unmodelled imitates."""
     verdict, members = weighed.verdict, weighed.fits[weighed.verdict.best].members
-    # of a cause that only shows beside something unmodelled the posterior of the sets says nothing
+    # the posterior of the sets lacks causes that are seen only jointly with something unmodelled
     posterior = dict.fromkeys(beside.known.members, 1.0) | verdict.inclusion
     calibrate = calibration_of("programs").calibrate
     inclusion = {i: calibrate(min(p, beside.credible.get(i, 1.0))) for i, p in posterior.items()}

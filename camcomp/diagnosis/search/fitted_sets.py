@@ -78,7 +78,7 @@ class FittedSets:
         """Sets without small members, the most probable first.
 
         A set with small members that is as likely as the best one gives its evidence to the set of its other members: a
-        larger set would take their place otherwise.
+        larger set would replace them otherwise.
         """
 
         def value(f: Fitted) -> float:

@@ -19,7 +19,7 @@ from camcomp.diagnosis.statistics.evidence import base
 from camcomp.ground.datatypes import Floats
 
 LARGE = 10.0  # size of an effect, in units of the noise, up to which an answer has to be right
-HIDDEN = 0.2  # what tells two apart at that size, in units of the noise, below which nobody should believe it
+HIDDEN = 0.2  # difference of two effects at that size, in units of the noise, below which they are indistinguishable
 _SHOWS = 0.1  # size, in units of the noise, that a typical effect has to reach to be looked at at all
 
 

@@ -22,7 +22,7 @@ from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.ground.datatypes import Bools, Floats
 
-UNDETERMINED = 0.5  # of a cause's size: runs that know it to no better say nothing of it
+UNDETERMINED = 0.5  # of a cause's size: runs that know it to no better do not determine it
 FEW_RUNS = 3  # from which on causes are fitted to the other runs
 KINDS = ("tip", "encoder", "drive", "dyno")
 SURE_Z = 5.0  # standard deviations of chance

@@ -46,7 +46,7 @@ class Fitted:
     residual: tuple[Floats, ...] = ()  # per run (w,), in absolute coordinates
     pushed: tuple[int, ...] = ()  # columns (p,) of small forces that springs changed by the members feel otherwise
     pushed_at: Floats | None = None  # (d,) coordinates of those springs
-    minor: Members = ()  # what the evidence has beside the members, and nobody names
+    minor: Members = ()  # minor causes in the evidence that are not reported
 
     @property
     def all_members(self) -> Members:
@@ -67,7 +67,7 @@ class CausePrior:
     columns: tuple[tuple[int, ...], ...]
     weight: Floats
     exclusive: Callable[[int, int], bool]  # whether two candidates make no sense together
-    kinds: tuple[tuple[int, ...], ...] = ()  # candidates that are one effect at several targets, alike in weight
+    kinds: tuple[tuple[int, ...], ...] = ()  # candidates that are one effect at several targets, with equal weights
     _priors: dict[tuple[Members, Members], float] = field(default_factory=dict, init=False, repr=False)
 
     def prior(self, members: Members, minor: Members = ()) -> float:

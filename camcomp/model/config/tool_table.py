@@ -19,7 +19,7 @@ from camcomp.model.config.doubt import Doubt
 from camcomp.model.config.yaml_tree import Node, child
 
 UNITS_MM = {"mm": 1.0, "inch": INCH_MM}
-SAME_MM = 1e-3  # lengths that are alike: tables have three decimals
+SAME_MM = 1e-3  # lengths that count as equal: tables have three decimals
 _FORM = ("type", "corner_radius_mm", "point_deg")
 _FILE_KEYS = ("file", "unit", "source")
 

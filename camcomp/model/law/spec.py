@@ -111,7 +111,7 @@ class MapSpec(_LawSpec):
         for name in self.over:
             self._known(name)
             if name not in self.envelope:
-                raise PydanticCustomError("CC291", f"the envelope says nothing of '{name}'")
+                raise PydanticCustomError("CC291", f"the envelope does not state '{name}'")
         lists = [isinstance(each, list) for each in self.coefficients_mm]
         if any(lists) != all(lists) or any(lists) != (len(self.over) == 2):
             raise PydanticCustomError("CC291", "coefficients_mm is one list per covariate deep")
@@ -121,7 +121,7 @@ class MapSpec(_LawSpec):
         if len(widths) != 1 or not all(DEGREE < each <= MOST_COEFFICIENTS for each in sizes):
             raise PydanticCustomError(
                 "CC291",
-                f"coefficients_mm has {DEGREE + 1} to {MOST_COEFFICIENTS} numbers along every covariate, alike in all rows",
+                f"coefficients_mm has {DEGREE + 1} to {MOST_COEFFICIENTS} numbers along every covariate, as many in all rows",
             )
         return self
 

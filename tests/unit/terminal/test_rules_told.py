@@ -82,4 +82,4 @@ def test_a_stream_with_a_line_in_error(told, monkeypatch):
     line = b"0,0,0,0,0,0\nnonsense\n"
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(line)))
     code, said = told("stream", "--config", CARTESIAN)
-    assert code == 1 and "error[CC605]: 1 of the lines" in said, said
+    assert code == 1 and "error[CC605]: 1 of the set-points" in said, said
