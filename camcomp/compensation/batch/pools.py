@@ -88,7 +88,7 @@ def _on_workers(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
             left = list(open_tasks.values())
             yield from run([delayed(work)(task) for task in left], jobs)
             yield from run(taken(), jobs)
-            get_reusable_executor().shutdown(wait=True, kill_workers=True)  # nothing is left to do: no farewells
+            get_reusable_executor().shutdown(wait=True, kill_workers=True)  # all tasks are done
             return
         except TerminatedWorkerError:
             continue

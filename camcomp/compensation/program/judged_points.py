@@ -115,7 +115,7 @@ def commanded_travel(points: JudgedPoints, orienting: Orienting | None, words: F
     """The travel with the orientation that words (N, 3) of the end points command; None: as programmed."""
     if orienting is None or words is None:
         return points.travel
-    before = np.array(UPRIGHT[orienting.form])  # the first move begins where nothing is judged
+    before = np.array(UPRIGHT[orienting.form])  # the first move begins outside of the judged points
     return orienting.told(points.travel, orienting.along(words, before, points.row, points.fraction))
 
 

@@ -68,7 +68,7 @@ def loaded_cut(job: Job, program: Program, step_mm: float = STEP_MM) -> LoadedCu
 
     none = np.zeros_like(way.told)
     free = tips(none)
-    bends = tips(track.force(piece, w)) - free  # as if nothing ever bent
+    bends = tips(track.force(piece, w)) - free  # as if the machine were rigid
     reach = max(FARTHER * float(np.linalg.norm(bends, axis=1).max(initial=0.0)), LEAST_REACH_MM)
     slope = np.stack([(tips(none + PROBE_N * axis) - free) / PROBE_N for axis in np.eye(3)], axis=2)
     for turn in range(ROUNDS):

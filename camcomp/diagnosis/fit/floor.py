@@ -1,4 +1,4 @@
-"""The noise floor: what the instruments and the machine's repeatability make of a reading when nothing is wrong.
+"""The noise floor: scatter of readings by the instruments and the machine's repeatability, without faults.
 
 It is measured or stated, and never what a fitted model leaves: fast noise from the scatter of neighbouring rows, slow
 noise as the repeatability of runs, or both as the experiment states them.

@@ -21,11 +21,11 @@ FAR_MM = 5.0  # no machine is wrong by so much from one row to the next
 MANY_FAR = 0.25  # of the rows that are as far off: more are no outliers
 SEEN = 12.0  # twice the logarithm of the odds from which on the tip has gone where an encoder says
 HEAVY = 3.5  # robust deviations beyond which a reading counts less
-TINY = 1e-12  # mm, rad, N: what rounding makes of nothing
+TINY = 1e-12  # mm, rad, N: rounding of zero
 
 
 def outlying(bench: Bench) -> list[Bools]:
-    """Per run (n, c): cells that have nothing to do with the machine: beam breaks, dropped telegrams. They are listed and not fitted."""
+    """Per run (n, c): cells that are no readings of the machine: beam breaks, dropped telegrams. They are listed and not fitted."""
     out = []
     for k, run in enumerate(bench.runs):
         gap = bench.observed(k) - bench.channels(k, bench.nominal[k])

@@ -349,7 +349,7 @@ class Problem:
         return out
 
     def _runs_of(self, i: int, shapes: Mapping[int, Mapping[str, float]]) -> list[bool]:
-        """In which runs a candidate acts: what begins and ends is nothing in the others."""
+        """Runs in which a candidate acts: effects that begin and end are zero in the others."""
         if not self.passing(i):
             return [True] * len(self.bench.runs)
         start, end = (shapes[i][p.name] for p in self.columns.candidates[i].shapes)
@@ -371,7 +371,7 @@ class Problem:
         return [(i, p) for i in members for p in self.columns.candidates[i].shapes if not p.placed]
 
     def passing(self, i: int) -> bool:
-        """Whether a candidate acts for a while only: other runs tell nothing of it."""
+        """Whether a candidate acts for a while only, so that other runs do not determine it."""
         return any(p.placed for p in self.columns.candidates[i].shapes)
 
     def row_places(self, k: int) -> Floats:
@@ -424,7 +424,7 @@ class Problem:
         rest = rest - A[:, : len(index)] @ theta
         size = np.linalg.norm(A, axis=0) + 1e-12
         step = np.linalg.lstsq(A / size, rest, rcond=1e-8)[0] / size
-        # what rows do not tell at all is known to next to nothing
+        # parameters that rows do not determine keep almost no information
         known = size**2 / np.diag(np.linalg.inv((A / size).T @ (A / size) + 1e-10 * np.eye(len(size))))
         most = np.array([reach(p, shapes[i][p.name]) * shapes[i][p.name] for i, p in names])
         whole = float(np.min(most / np.maximum(np.abs(step[len(index) :]), 1e-300)))

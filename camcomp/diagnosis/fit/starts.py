@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before its play is taken up
 STOOD_MM, STOOD_RAD = 5e-3, 5e-6  # by which it may have moved and stands: a digit of its encoder
-UNDER_WAY = 8  # rows from the one to the other, in which nothing is known of it
+UNDER_WAY = 8  # rows from the one to the other, in which its state is unknown
 START_MM, START_RAD = 0.1, 5e-5  # where its carriage may stand until then: play and guides as bad as they come
 START_N, START_NMM = 1000.0, 1e6  # and how hard its guide may hold it there
-ALWAYS_MM, ALWAYS_RAD = 0.005, 5e-6  # the same where it hardly ever moves: little, or nothing would be known of it
+ALWAYS_MM, ALWAYS_RAD = 0.005, 5e-6  # the same where it hardly ever moves: small, or all of its rows would be unknown
 ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
 STARTING_ROWS = 2
 SWING_S = 0.03  # times the speed with which a log begins: how far a loop may then stand from where it is told

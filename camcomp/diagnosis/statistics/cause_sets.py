@@ -84,7 +84,7 @@ class CausePrior:
         """How a set may have come about: the log prior probability of each way, and members that are of one size in it.
 
         One by one, each of a size of its own; or one effect at several targets is one cause, by whatever all of these have
-        in common. What is minor has nothing in common with them: three of a kind are one thing, two and a minor one are not.
+        in common. Minor ones have no part in common with them: three of a kind are one thing, two and a minor one are not.
         """
         one_by_one: list[Members] = [(i,) for i in (*members, *minor)]
         ways = [(_in_any_order([float(self.weight[i]) for (i,) in one_by_one]), one_by_one)]

@@ -12,7 +12,7 @@ COMMON_LOG = float(np.log(1.5))  # by which shapes of one origin differ: drives 
 class SoughtShape:
     """A shape at its best value: the logarithm of that, what rows tell of it, and the range of logarithms searched.
 
-    information: inverse variance of the logarithm, 0 where nothing is told.
+    information: inverse variance of the logarithm, 0 where it is unknown.
     """
 
     log: float
