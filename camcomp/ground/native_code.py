@@ -18,7 +18,7 @@ import numpy as np
 
 INNER: dict[Callable[..., Any], tuple[bool, bool]] = {}  # functions that only compiled ones call: fastmath, allocates
 Run = Any  # (None, arguments, None) -> result
-_KINDS = {np.dtype(each).str for each in ("f8", "i8", "u8", "i4", "i1", "u1", "?")}
+_KINDS = {np.dtype(each).str for each in ("f8", "f4", "i8", "u8", "i4", "i1", "u1", "?")}
 _SCALARS = {bool: "|b1", int: "<i8", float: "<f8"}
 
 

@@ -2,8 +2,10 @@
 
 import json
 
+import numpy as np
 import pytest
 
+from camcomp.ground.native_code import describe
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 
@@ -70,3 +72,8 @@ def test_a_program_whose_interpolation_is_not_good_enough_is_solved_point_by_poi
     words = ("compensate", program, "--config", CONFIG, "--summary", summary, "-q")
     assert run([*map(str, words)]) == 0
     assert "interpolation" not in json.loads(summary.read_text())
+
+
+def test_the_kernels_of_a_stock_are_kept():
+    """Arguments that cannot be described are compiled for in every process."""
+    assert describe((np.zeros(3, np.float32),)) == (("<f4", 1, "C", True),)
