@@ -11,6 +11,8 @@ from typing import Any, Literal
 from camcomp import __version__
 from camcomp.compensation.batch import pools
 from camcomp.compensation.batch.programs import (
+    DONE,
+    ERROR,
     FoundProgram,
     Plan,
     Status,
@@ -28,7 +30,7 @@ from camcomp.model.from_program import StockChoice
 from camcomp.report.findings import Case, findings_of_messages
 from camcomp.report.outputs import findings_files
 
-__all__ = ["Status", "compensate_many"]
+__all__ = ["DONE", "ERROR", "Status", "compensate_many"]
 
 SUMMARY = "camcomp-batch.json"
 INTERRUPTED = 130  # exit code in the summary of a batch ended by a signal or a bug

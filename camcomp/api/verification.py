@@ -6,10 +6,11 @@ from pathlib import Path
 
 from camcomp.api.machine import Job, Program, program_in
 from camcomp.compensation.program import verify as story
+from camcomp.compensation.program.result import LineResult
 from camcomp.compensation.program.verify import Verified
 from camcomp.model.from_program import StockChoice, job_of_program
 
-__all__ = ["Verified", "verify"]
+__all__ = ["LineResult", "Verified", "verify"]
 
 
 def verify(

@@ -63,6 +63,7 @@ from camcomp.model.motion.twin import Twin
 ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
 MOSTLY_ONE_ACTUATOR = 0.6  # share of what is unknown from which on it is one actuator's
 VIBRATION_SHARE = 0.4  # of the gap in one line of the spectrum
+EXCLUDED = 0.02  # probability of a set of causes, below which no experiment need test it
 UNTESTED = 0.1  # of the leader's probability: the least that a set that explains as well counts as
 LEAST_DRIVER = 0.02  # share of what is left, below which nothing is a driver
 MOST_ALTERNATIVES = 4  # sets that are listed (contract, section 6)
@@ -152,7 +153,8 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
     best = found.verdict.best
     close = [best, *sorted(found.verdict.rivals, key=lambda j: -found.probability[j])[:RIVALS]]
     if len(close) == 1:
-        close += [j for j in np.argsort(-found.probability) if j != best][:3]
+        likely = (int(j) for j in np.argsort(-found.probability) if found.probability[j] > EXCLUDED)
+        close += [j for j in likely if j != best][:3]
     p = found.probability[close]
     if found.verdict.rivals:
         p = np.maximum(p, UNTESTED * p.max())  # they explain equally well: a low prior does not exclude them

@@ -73,8 +73,7 @@ def command(
         raise click.BadParameter("the address of the scheduler is empty", param_hint="--scheduler")
     if scheduler and jobs:
         raise click.UsageError("--jobs is about this machine; a scheduler has its own workers")
-    from camcomp.api.batch import compensate_many
-    from camcomp.compensation.batch.programs import ERROR
+    from camcomp.api.batch import ERROR, compensate_many
 
     def on_status(status: Status, number: int, total: int) -> None:
         progress.done(number / total)
@@ -95,7 +94,7 @@ def command(
 
 
 def _tell(status: Status, number: int, total: int) -> None:
-    from camcomp.compensation.batch.programs import DONE
+    from camcomp.api.batch import DONE
 
     text = f"[{number}/{total}] {status.status}: {display_name(status.source)}"
     if status.figures:

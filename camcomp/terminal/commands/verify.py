@@ -15,8 +15,7 @@ from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
     from camcomp.api.machine import Program, StockChoice
-    from camcomp.compensation.program.result import LineResult
-    from camcomp.compensation.program.verify import Verified
+    from camcomp.api.verification import LineResult, Verified
 
 _NOT_COMPENSATED = "the program has no stamp of camcomp compensate: compensate it first"
 

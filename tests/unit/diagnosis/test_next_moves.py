@@ -17,7 +17,7 @@ from tests.unit.diagnosis.test_studies import axis_log
 @pytest.fixture(scope="module")
 def log():
     """A line of 5 mm in the drive force, which no effect makes; 20 s would be enough rows, every tenth is used."""
-    whole = axis_log(line=2.0)
+    whole = axis_log(line=2.0, step=1e-3)
     return replace(whole, **{name: getattr(whole, name)[::10] for name in ("time", "setpoint", "encoder", "force")})
 
 

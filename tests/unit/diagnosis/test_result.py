@@ -79,7 +79,7 @@ def test_a_result_without_unseen_runs_is_told_and_drawn(verdict):
     alone = result(verdict).model_copy(update={"shrinkage": None})
     check("diagnosis", alone.as_json())
     told = "\n".join(answer_lines(alone))
-    assert "has not seen; the noise floor is 0.87" in told or verdict == "none"
+    assert "an unseen one is not checked; the noise floor is 0.87" in told or verdict == "none"
     assert "goes from" not in told and "removed" not in told
     assert b"ladder" not in diagnosis_html(alone, [], title="e", machine="m")
 
