@@ -93,6 +93,6 @@ def test_the_table_is_written_or_an_error_says_why(tmp_path, log, capsys):
     assert written.dtype.names == ("t_s", "cmd_x_mm")
     np.testing.assert_allclose(written["cmd_x_mm"], set_points(moves)[1], atol=1e-6)
     (tmp_path / "n.csv").unlink()
-    healthy = axis_log()
+    healthy = axis_log(step=1e-3)
     assert run(experiment(healthy.force[::10])) == 1
     assert "CC608" in capsys.readouterr().err and not (tmp_path / "n.csv").exists()
