@@ -102,8 +102,12 @@ def held_errors(found: Sequence[AxisFindings], *, explained: bool) -> dict[str, 
 
 
 def position_floor(axis: AxisFindings) -> float:
-    """Noise of the error of an axis, in the study's mm."""
-    return float(np.sqrt(sum(c.floor**2 for _, c, _ in _channels([axis]))))
+    """Noise of the error of an axis, in the study's mm: of a channel at most the error that was measured."""
+    return float(np.sqrt(sum(min(c.floor**2, _variance(c)) for _, c, _ in _channels([axis]))))
+
+
+def _variance(channel: AxisChannel) -> float:
+    return float(np.var(np.concatenate([values for _, values in channel.whole])))
 
 
 def _channels(found: Sequence[AxisFindings]) -> list[tuple[AxisFindings, AxisChannel, float]]:

@@ -1,11 +1,17 @@
 """No verdict contradicts its noise floor, whatever kind of study it is of."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from camcomp.diagnosis.axis.findings import AxisDeviation
+from camcomp.diagnosis.axis.study import study
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import DiagnosisResult
 from tests.contradictions import contradictions
 from tests.report.diagnoses import result
+from tests.unit.diagnosis.test_studies import axis_log
 
 FLOOR = {"noise_floor_um": 0.87}
 
@@ -58,3 +64,19 @@ def test_forces_show_what_no_position_does():
 @pytest.mark.parametrize("verdict", ["none", "identified", "ambiguous", "unknown"])
 def test_what_is_above_the_floor_stays_as_it_is(verdict):
     assert within_floor(result(verdict)) == result(verdict)
+
+
+def test_axes_that_are_quieter_than_stated_do_not_hide_another_one():
+    """1.2 um in x; 1 um is stated for each of three axes, of which two have 0.1 um."""
+    log = axis_log(lag=0.0, step=0.02)
+    speed, rng = np.gradient(log.encoder, log.time), np.random.default_rng(1)
+
+    def axis(um, lag_ms):
+        error = 1e-3 * lag_ms * speed + 1e-3 * um * rng.standard_normal(len(speed))
+        return replace(log, setpoint=log.encoder + error, force=np.full(len(speed), np.nan))
+
+    told = study(
+        {"x": [axis(0.1, 0.013)], "y": [axis(0.1, 0.0)], "z": [axis(0.1, 0.0)]}, stated=AxisDeviation(1e-3, 1.0)
+    )
+    assert told.gap.rms_um < 1e3 * np.sqrt(3.0) * 1e-3
+    assert [(c.effect, c.target) for c in told.causes][:1] == [("servo_lag", "x")]
