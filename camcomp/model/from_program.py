@@ -166,10 +166,8 @@ def _material_text(material: StatedMaterial) -> str:
 
 
 def _contradicting_materials(stated: Stated) -> list[str]:
-    names = {each.name.lower(): each for each in reversed(stated.materials)}
-    first, other, *_ = [*names.values(), None, None]
-
-    return [f"{_material_text(first)} contradicts {_material_text(other)}"] if first and other else []
+    named = {each.name.lower(): _material_text(each) for each in stated.materials}
+    return [" contradicts ".join([*named.values()][:2])] if len(named) > 1 else []
 
 
 def _stock_text(stock: StatedStock) -> str:
@@ -203,4 +201,4 @@ def _words(stock: Stock) -> str:
 
 
 def _triple(values: list[float]) -> str:
-    return "[" + ", ".join(f"{each:g}" for each in values) + "]"
+    return "[" + ", ".join(f"{each + 0.0:g}" for each in values) + "]"

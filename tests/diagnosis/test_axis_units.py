@@ -71,11 +71,12 @@ def test_what_is_on_top_of_a_machine_file_changes_its_entry(tmp_path):
 
 
 def ripple(folder, name, frequency, seed):
-    """J1 with 0.6 mrad sin(50 q) over 0.02 mrad of noise; J2 stands, and the other joints are not logged."""
+    """J1 with 0.6 mrad sin(50 q) over 0.02 mrad of noise; J2 stands at 20 deg and J6 at 0, and the other joints are not logged."""
     t = np.arange(0, 10, 0.01)
     q = 0.4 * np.sin(2 * np.pi * frequency * t) + 0.2 * np.sin(4.6 * np.pi * frequency * t + 1)
     act = q + 0.6e-3 * np.sin(50 * q) + np.random.default_rng(seed).normal(0, 2e-5, len(q))
     still = dict.fromkeys(("cmd_J2_rad", "act_J2_rad"), np.full(len(t), np.radians(20)))
+    still |= dict.fromkeys(("cmd_J6_rad", "act_J6_rad"), np.zeros(len(t)))
     write(folder, f"{name}.csv", {"t_s": t, "cmd_J1_rad": q, "act_J1_rad": act, **still})
 
 

@@ -108,7 +108,8 @@ def healthy_sizes(columns: Sequence[Sizes], values: Sequence[Floats], floor: flo
     """
     X = np.concatenate([np.concatenate([*own.values()], axis=1) for own in columns])
     y = np.concatenate([*values])
-    scale = np.sqrt(np.mean(X**2, axis=0)) + 1e-300
+    rms = np.sqrt(np.mean(X**2, axis=0))
+    scale = np.where(rms > 0.0, rms, 1.0)  # columns of zeros keep their prior
     X = X / scale
     left = y - X @ np.linalg.lstsq(X, y, rcond=1e-9)[0]
     sd = max(float(np.sqrt(np.mean(left**2) * rows_together(left))), floor)

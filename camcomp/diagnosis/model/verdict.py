@@ -17,8 +17,8 @@ class VerdictInputs:
 
     unknown: probability of model discrepancy. best: probability that all causes of the best set act, with or without
     others; of the empty set, that the most probable cause is absent. alternatives: number of sets as good as it.
-    causes: number of causes of the best set. known_noise: whether the floor is identifiable. confirmed: whether withheld groups support the set and are at their floor; None: all groups are
-    fitted.
+    causes: number of causes of the best set. known_noise: whether the floor is identifiable. confirmed: whether withheld
+    groups support the set and are at their floor; None: all groups are fitted.
     """
 
     unknown: float

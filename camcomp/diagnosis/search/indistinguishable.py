@@ -73,7 +73,7 @@ class Likeness:
 
 
 def likeness(problem: Problem) -> Likeness:
-    """The design of an problem."""
+    """The design of a problem."""
     k = len(problem.columns.names)
     grams = [np.zeros((k, k)) for _ in problem.dictionaries]
     rows = [0] * len(grams)

@@ -186,6 +186,12 @@ def test_a_tool_that_is_no_flat_mill_is_warned_of(tmp_path, kind):
     assert any(f"the tool is a {kind}" in each for each in compensate(CUTS.encode(), own).summary.warnings)
 
 
+def test_the_corner_of_a_stock_at_zero_has_no_sign(tmp_path):
+    text = "(STOCK/BLOCK,100,60,20,0,0,20)\n" + CUTS
+    found = compensate(text.encode(), machine(tmp_path, "tool: {diameter_mm: 8}\n")).summary.stated_in_program
+    assert any("stock box [0, 0, -20] to [100, 60, 0] mm" in each for each in found)
+
+
 def test_terminal_summary_and_batch_say_the_force(tmp_path):
     program = tmp_path / "p.nc"
     program.write_text(STOCK + TOOL + CUTS)
