@@ -40,7 +40,7 @@ class InterpolatedMachine:
         if mode != TARGET:
             commanded = near
             if rho is not None:
-                commanded = self._tips(rho, near, nominal, tile)
+                commanded = _tips(known, rho, near, nominal, tile)
             shift, _, within = known.look(commanded, force, every=False)
             tip = commanded + shift[:, 3:6]
             answer, _, inside = known.look(tip, force)
@@ -69,18 +69,6 @@ class InterpolatedMachine:
         if self._field is None:
             self._field = Field(self.machine, force, self._middle, TileFiles(self.machine))
         return self._field
-
-    def _tips(self, rho: Floats, near: Floats, nominal: Floats, tile: Ints) -> Floats:
-        """Tips (n, 3) whose set-points are rho (n, m), from tips `near` with set-points `nominal`: Newton's method."""
-        known = self._known(near)
-        rates, out = np.linalg.inv(known.tiles.rates[np.maximum(tile, 0)]), near
-        for _ in range(MOST_STEPS):
-            step = np.einsum("nij,nj->ni", rates, rho - nominal)
-            out = out + step
-            if not np.abs(step).max(initial=0.0) > STEP_MM:
-                break
-            nominal = known.look(out, None)[1]
-        return out
 
     def _with_exact(
         self, state: State, rows: Ints, *, mode: int, near: Floats, force: Floats, rho: Floats | None
@@ -137,3 +125,15 @@ def with_answers(job: Job) -> Job:
     vars(other)["real_machine"] = replace(machine, answers=InterpolatedMachine(machine, job.frame.origin))
     vars(other)["causes"] = job.causes
     return other
+
+
+def _tips(known: Field, rho: Floats, near: Floats, nominal: Floats, tile: Ints) -> Floats:
+    """Tips (n, 3) whose set-points are rho (n, m), from tips `near` with set-points `nominal`: Newton's method."""
+    rates, out = np.linalg.inv(known.tiles.rates[np.maximum(tile, 0)]), near
+    for _ in range(MOST_STEPS):
+        step = np.einsum("nij,nj->ni", rates, rho - nominal)
+        out = out + step
+        if not np.abs(step).max(initial=0.0) > STEP_MM:
+            break
+        nominal = known.look(out, None)[1]
+    return out
