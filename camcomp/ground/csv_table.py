@@ -43,7 +43,8 @@ class TableRules:
 class CsvTable:
     """Cells as text, each with its location. header: names of the columns; rows: n rows of cells, of any length.
 
-    headed: the file contains the names; otherwise columns are called 1, 2, 3 and so on.
+    headed: the file contains the names; otherwise columns are called 1, 2, 3 and so on. A workbook has no source lines:
+    a cell is located by its row and column.
     """
 
     name: str
@@ -58,6 +59,8 @@ class CsvTable:
     def at(self, row: int, column: int = 0) -> Location:
         """Location of a cell; row -1 is the header, or the first row without one. A missing cell is behind the last one."""
         line = self._line[row + 1]
+        if not self._source:
+            return Location(self.name, line, column + 1)
         source = self._source[line - 1]
         return Location(self.name, line, min(_start(source, self.mark, column), len(source)) + 1, source)
 
@@ -135,7 +138,7 @@ def read_csv(
     lines, rows = _rows(text, mark, name, rules, source)
     if not rows:
         raise ConfigError(rules.table, "the file is empty", at=Location(name, 1, 1), hint=NEEDED)
-    headed = not (spreadsheet and _share_of_numbers(rows[0], decimal_comma=mark != ",") > 0.5)
+    headed = not (spreadsheet and share_of_numbers(rows[0], decimal_comma=mark != ",") > 0.5)
     if not headed:
         rows, lines = [[str(j + 1) for j in range(len(rows[0]))], *rows], [lines[0], *lines]
     header = tuple(cell.strip() for cell in rows[0])
@@ -185,11 +188,11 @@ def _mark(first: str) -> str:
         if mark in first:
             return mark
     words = first.split()
-    parted = len(words) > 1 and ("," not in first or _share_of_numbers(words, decimal_comma=True) == 1.0)
+    parted = len(words) > 1 and ("," not in first or share_of_numbers(words, decimal_comma=True) == 1.0)
     return _BLANK if parted else ","
 
 
-def _share_of_numbers(cells: Sequence[str], *, decimal_comma: bool) -> float:
+def share_of_numbers(cells: Sequence[str], *, decimal_comma: bool) -> float:
     """Share of numbers among the cells with text, 0 to 1."""
     numbers = [_number(cell.strip(), decimal_comma=decimal_comma) is not None for cell in cells if cell.strip()]
     return sum(numbers) / max(len(numbers), 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from datetime import date, timedelta
 from typing import Annotated, Any, Literal
 
@@ -12,8 +13,6 @@ from pydantic import Field
 from camcomp.diagnosis.history.drift import Course, course_of, days_until, drift_bound
 from camcomp.diagnosis.history.folder import Kept
 from camcomp.ground.result import Result
-
-NORMAL = 3.92  # widths of a 95 % interval in standard deviations
 
 
 class DatedValue(Result):
@@ -71,11 +70,9 @@ def chronicle_of(kept: Sequence[Kept], tolerance_um: float) -> Chronicle:
     """The history of diagnoses in order; tolerance_um: allowed drift of the tip since the last one, um."""
     found: dict[tuple[str, str | None, str], list[tuple[Kept, Any, float]]] = {}
     for each in kept:
+        gap = each.result.gap
         for cause in each.result.known:
-            size = (
-                cause.share**0.5
-                * max(each.result.gap.rms_um**2 - (each.result.gap.noise_floor_um or 0.0) ** 2, 0.0) ** 0.5
-            )
+            size = (cause.share * max(gap.rms_um**2 - (gap.noise_floor_um or 0.0) ** 2, 0.0)) ** 0.5
             for name, estimate in cause.parameters.items():
                 found.setdefault((cause.effect, cause.target, name), []).append((each, estimate, size))
     courses = [_course(key, rows, tolerance_um) for key, rows in found.items()]
@@ -122,10 +119,9 @@ def _course(
     effect, target, name = key
     days = np.array([kept.day.toordinal() for kept, _, _ in rows], float)
     values = np.array([each.value for _, each, _ in rows])
-    deviations = np.array([max(each.ci95[1] - each.ci95[0], 0.0) / NORMAL for _, each, _ in rows])
+    deviations = np.array([max(each.ci95[1] - each.ci95[0], 0.0) / (2.0 * 1.96) for _, each, _ in rows])
     deviations = np.maximum(deviations, 1e-9 * max(float(np.abs(values).max()), 1e-300))
     course = course_of(days, values, deviations)
-    rate_sd = course.rate_sd if course.kind == "drift" else 0.0
     return ParameterCourse(
         effect=effect,
         target=target,
@@ -136,7 +132,7 @@ def _course(
         course=course.kind,
         level=course.level,
         rate_per_year=365.25 * course.rate,
-        rate_ci95=(365.25 * (course.rate - 1.96 * rate_sd), 365.25 * (course.rate + 1.96 * rate_sd)),
+        rate_ci95=(365.25 * (course.rate - 1.96 * course.rate_sd), 365.25 * (course.rate + 1.96 * course.rate_sd)),
         changed=tuple(rows[k][0].day for k in course.jumps),
         measure_again=_due(course, days, deviations, rows, tolerance_um),
     )  # fmt: skip
@@ -159,8 +155,5 @@ def _due(
         bound = drift_bound(days[since], deviations[since])
         if bound == 0.0:  # one measurement does not predict
             return None
-        course = Course(
-            kind=course.kind, level=course.level, level_sd=course.level_sd, rate=0.0, rate_sd=bound,
-            jumps=course.jumps, spread=course.spread,
-        )  # fmt: skip
+        course = replace(course, rate_sd=bound)
     return last.day + timedelta(days=int(days_until(course, limit)))

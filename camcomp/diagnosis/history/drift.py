@@ -21,69 +21,30 @@ _MARGIN = 4.0  # least difference of the criterion for a richer description: odd
 
 @dataclass(frozen=True, kw_only=True)
 class Course:
-    """Course of a value.
-
-    rate, rate_sd: per day (drift); jumps: rows at which it changed; level, level_sd: present value; spread: scatter about the
-    description in units of the stated deviations.
-    """
+    """Course of a value. level, level_sd: present value; rate, rate_sd: per day (drift); jumps: rows at which it changed."""
 
     kind: Literal["steady", "drift", "jumps", "too few"]
     level: float
     level_sd: float
-    rate: float
-    rate_sd: float
-    jumps: tuple[int, ...]
-    spread: float
+    rate: float = 0.0
+    rate_sd: float = 0.0
+    jumps: tuple[int, ...] = ()
 
 
 def course_of(days: Floats, values: Floats, deviations: Floats) -> Course:
     """The course of values (n,) with standard deviations (n,) measured at days (n,), in order of the days."""
-    n = len(days)
-    weight = 1.0 / np.maximum(deviations, 1e-300) ** 2
-    mean, misfit = _constant(values, weight)
-    if n < FEWEST:
-        return Course(
-            kind="too few", level=mean, level_sd=float(weight.sum() ** -0.5), rate=0.0, rate_sd=0.0, jumps=(),
-            spread=_spread(misfit, n - 1),
-        )  # fmt: skip
-    line = _line(days, values, weight)
-    cost: list[tuple[float, Course]] = [
-        (
-            misfit + np.log(n),
-            Course(
-                kind="steady",
-                level=mean,
-                level_sd=float(weight.sum() ** -0.5),
-                rate=0.0,
-                rate_sd=0.0,
-                jumps=(),
-                spread=_spread(misfit, n - 1),
-            ),
-        )
-    ]
-    now, now_sd, rate, rate_sd, left = line
-    cost.append(
-        (
-            left + 2 * np.log(n) + _MARGIN,
-            Course(
-                kind="drift",
-                level=now,
-                level_sd=now_sd,
-                rate=rate,
-                rate_sd=rate_sd,
-                jumps=(),
-                spread=_spread(left, n - 2),
-            ),
-        )
-    )
-    for count, (starts, left) in enumerate(_steps(values, weight), 1):
+    n, weight = len(days), 1.0 / np.maximum(deviations, 1e-300) ** 2
+    line, misfit = _line(days, values, weight)
+    cost: list[tuple[float, Course]] = [(misfit + 2 * np.log(n) + _MARGIN, line)]
+    for count, (starts, misfit) in enumerate(_steps(values, weight)):
         last = slice(starts[-1], n)
-        level, _ = _constant(values[last], weight[last])
         own = Course(
-            kind="jumps", level=level, level_sd=float(weight[last].sum() ** -0.5), rate=0.0, rate_sd=0.0,
-            jumps=tuple(starts[1:]), spread=_spread(left, n - 1 - 2 * count),
+            kind="jumps" if count else "steady" if n >= FEWEST else "too few", jumps=tuple(starts[1:]),
+            level=float(np.average(values[last], weights=weight[last])), level_sd=float(weight[last].sum() ** -0.5),
         )  # fmt: skip
-        cost.append((left + (1 + 2 * count) * np.log(n) + _MARGIN * count, own))
+        if n < FEWEST:
+            return own
+        cost.append((misfit + (1 + 2 * count) * np.log(n) + _MARGIN * count, own))
     return min(cost, key=lambda each: each[0])[1]
 
 
@@ -101,31 +62,22 @@ def days_until(course: Course, limit: float, most: float = 730.0) -> float:
 
 def drift_bound(days: Floats, deviations: Floats) -> float:
     """Deviation of the slope (per day) of a line through measurements at days (n,) with deviations (n,); 0 for fewer than two."""
-    weight = 1.0 / np.maximum(deviations, 1e-300) ** 2
-    centred = days - np.average(days, weights=weight)
-    spread = float(np.sum(weight * centred**2))
-    return spread**-0.5 if spread > 0.0 else 0.0
+    return _line(days, np.zeros(len(days)), 1.0 / np.maximum(deviations, 1e-300) ** 2)[0].rate_sd
 
 
-def _constant(values: Floats, weight: Floats) -> tuple[float, float]:
-    mean = float(np.average(values, weights=weight))
-    return mean, float(np.sum(weight * (values - mean) ** 2))
-
-
-def _line(days: Floats, values: Floats, weight: Floats) -> tuple[float, float, float, float, float]:
-    """Value at the last day with its deviation, rate with its deviation, weighted sum of squared residuals."""
-    since = days - days[-1]
-    matrix = np.column_stack((np.ones(len(days)), since))
-    normal = matrix.T @ (weight[:, None] * matrix)
-    covariance = np.linalg.pinv(normal)
+def _line(days: Floats, values: Floats, weight: Floats) -> tuple[Course, float]:
+    """The straight line through the values, and its weighted sum of squared residuals."""
+    matrix = np.column_stack((np.ones(len(days)), days - days[-1]))
+    covariance = np.linalg.pinv(matrix.T @ (weight[:, None] * matrix))
     now, rate = covariance @ (matrix.T @ (weight * values))
-    left = float(np.sum(weight * (values - matrix @ [now, rate]) ** 2))
-    return float(now), float(np.sqrt(covariance[0, 0])), float(rate), float(np.sqrt(covariance[1, 1])), left
+    sd, rate_sd = np.sqrt(np.diag(covariance))
+    line = Course(kind="drift", level=float(now), level_sd=float(sd), rate=float(rate), rate_sd=float(rate_sd))
+    return line, float(np.sum(weight * (values - matrix @ [now, rate]) ** 2))
 
 
 def _steps(values: Floats, weight: Floats) -> list[tuple[list[int], float]]:
-    """For one, two, ... jumps: first rows of the pieces of the best division, and its weighted sum of squared residuals."""
-    n = len(values)
+    """For no, one, two, ... jumps: first rows of the pieces of the best division, and its weighted sum of squared residuals."""
+    n, values = len(values), values - np.average(values, weights=weight)
     w, wv, wvv = (np.concatenate(([0.0], np.cumsum(each))) for each in (weight, weight * values, weight * values**2))
 
     def squares(a: int, b: int) -> float:
@@ -134,7 +86,7 @@ def _steps(values: Floats, weight: Floats) -> list[tuple[list[int], float]]:
 
     best = [[squares(0, b) if b else 0.0 for b in range(n + 1)]]
     start = [[0] * (n + 1)]
-    out = []
+    out = [([0], best[0][n])]
     for count in range(1, min(MOST_JUMPS, n - 1) + 1):
         row, origin = [np.inf] * (n + 1), [0] * (n + 1)
         for b in range(count + 1, n + 1):
@@ -149,7 +101,3 @@ def _steps(values: Floats, weight: Floats) -> list[tuple[list[int], float]]:
             pieces.append(b)
         out.append(([0, *reversed(pieces[1:])], row[n]))
     return out
-
-
-def _spread(misfit: float, free: int) -> float:
-    return float(np.sqrt(misfit / free)) if free > 0 else 1.0

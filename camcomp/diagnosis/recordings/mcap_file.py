@@ -9,15 +9,13 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable, Iterator
-from functools import partial
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from camcomp.diagnosis.recordings.sampled import SampledColumns, library, reading, some
+from camcomp.diagnosis.recordings.sampled import SampledColumns, library, of_values, reading, some
 from camcomp.diagnosis.recordings.units import SI
-from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
 _WHAT = "an MCAP file"
@@ -60,38 +58,14 @@ def read_mcap(data: bytes, name: str) -> list[SampledColumns]:
         names = list(dict.fromkeys(key for row in found for key in row))
         if names:
             table = np.array([[row.get(key, np.nan) for key in names] for row in found])
-            out.append(
-                _sampled(
-                    file=name,
-                    names=names,
-                    table=table,
-                    times=np.array(times[topic]),
-                    unit=SI if in_si[topic] else "",
-                    notes=notes,
-                )
-            )
+            stamps, logged = np.array(times[topic]).T
+            time = stamps if np.isfinite(stamps).all() else logged
+            units = [SI if in_si[topic] else ""] * len(names)
+            out.append(of_values(name, names, units, list(table.T), time, notes))
             notes = []
     if not out:
         raise ConfigError("CC452", "the file has no messages with numbers", at=Location(name, 1, 1))
     return out
-
-
-def _sampled(file: str, names: list[str], table: Floats, times: Floats, unit: str, notes: list[str]) -> SampledColumns:
-    """One topic. times (n, 2) s: stamp of the message, and time of logging; the stamps count if all messages have one."""
-    time = times[:, 0] if np.isfinite(times[:, 0]).all() else times[:, 1]
-    units = (unit,) * len(names)
-    return SampledColumns(
-        file=file, names=tuple(names), units=units, rows=len(table), time=time, read=partial(_column, table),
-        at=partial(_at, file), notes=tuple(notes),
-    )  # fmt: skip
-
-
-def _column(table: Floats, j: int) -> Floats:
-    return table[:, j]
-
-
-def _at(file: str, row: int, column: int) -> Location:
-    return Location(file, 1, 1)
 
 
 def _decoder(encoding: str, schema: Any, factories: list[Any]) -> Callable[[bytes], Any] | None:

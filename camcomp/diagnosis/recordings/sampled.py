@@ -32,6 +32,16 @@ class SampledColumns:
     headed: bool = True
 
 
+def of_values(
+    file: str, names: Sequence[str], units: Sequence[str], values: Sequence[Floats], time: Floats | None, notes: Sequence[str]
+) -> SampledColumns:  # fmt: skip
+    """Columns of values (n,) that a container holds as numbers: their cells have no location of their own."""
+    return SampledColumns(
+        file=file, names=tuple(names), units=tuple(units), rows=len(values[0]), time=time, read=values.__getitem__,
+        at=lambda row, column: Location(file, 1, 1), notes=tuple(notes),
+    )  # fmt: skip
+
+
 def library(module: str, package: str, what: str) -> Any:
     """Import an optional module. Raises ConfigError CC216 with the package to install."""
     try:

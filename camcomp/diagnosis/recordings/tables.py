@@ -29,7 +29,7 @@ def read_text_table(
     if table.headed:
         return [of_table(table, notes=notes)]
     counted = table.mark == " " and _counts(table) and not (len(names) == len(table.header) and names[0] == TIME)
-    table = _named(table, names, counted)
+    table = named(table, names, counted)
     if not counted:
         return [of_table(table, notes=notes)]
     number = table.value
@@ -116,7 +116,7 @@ def _counts(table: CsvTable) -> bool:
     return bool((first == np.round(first)).all() and (steps >= 1.0).all() and np.mean(steps == 1.0) > 0.5)
 
 
-def _named(table: CsvTable, names: Sequence[str], counted: bool) -> CsvTable:
+def named(table: CsvTable, names: Sequence[str], counted: bool = False) -> CsvTable:
     """The table with names; the column of the sample number may have none."""
     if not names:
         return table

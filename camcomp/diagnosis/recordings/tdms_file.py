@@ -6,12 +6,11 @@ import io
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from camcomp.diagnosis.recordings.sampled import SampledColumns, library, reading
+from camcomp.diagnosis.recordings.sampled import SampledColumns, library, of_values, reading
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
@@ -38,10 +37,13 @@ def read_tdms(data: bytes, name: str) -> list[SampledColumns]:
     notes = [f"npTDMS: {each}" for each in remarks[:1]]
     if dropped:
         notes.append(f"{dropped} channels without numbers dropped")
-    return [
-        _sampled(name, key, channels, tuple(notes) if i == 0 else ())
-        for i, (key, channels) in enumerate(together.items())
-    ]
+    out = []
+    for (_, rows, step, start), channels in together.items():
+        time = None if step is None else np.asarray(start + step * np.arange(rows), float)
+        labels, units, columns = zip(*channels, strict=True)
+        out.append(of_values(name, labels, units, columns, time, notes))
+        notes = []
+    return out
 
 
 @contextmanager
@@ -74,21 +76,3 @@ def _sampling(properties: Any) -> tuple[float | None, float]:
     start = properties.get("wf_start_time")
     since = 0.0 if start is None else np.datetime64(start).astype("datetime64[us]").astype(np.int64) * 1e-6
     return float(step), float(since) + float(properties.get("wf_start_offset", 0.0))
-
-
-def _sampled(file: str, key: _Key, channels: list[tuple[str, str, Floats]], notes: tuple[str, ...]) -> SampledColumns:
-    _, rows, step, start = key
-    time = None if step is None else np.asarray(start + step * np.arange(rows), float)
-    names, units, values = zip(*channels, strict=True)
-    return SampledColumns(
-        file=file, names=tuple(names), units=tuple(units), rows=rows, time=time, read=partial(_column, values),
-        at=partial(_at, file), notes=notes,
-    )  # fmt: skip
-
-
-def _column(values: tuple[Floats, ...], j: int) -> Floats:
-    return values[j]
-
-
-def _at(file: str, row: int, column: int) -> Location:
-    return Location(file, 1, 1)

@@ -63,7 +63,7 @@ def test_the_best_division_is_that_of_trying_all():
         parts = [(values[a:b], weight[a:b]) for a, b in zip(starts, ends, strict=True)]
         return sum(float(np.sum(w * (v - np.average(v, weights=w)) ** 2)) for v, w in parts)
 
-    for count, (starts, found) in enumerate(_steps(values, weight), 1):
+    for count, (starts, found) in enumerate(_steps(values, weight)):
         best = min(left((0, *each)) for each in combinations(range(1, 9), count))
         assert found == pytest.approx(best) and left(starts) == pytest.approx(best)
 
