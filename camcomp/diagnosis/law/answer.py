@@ -50,7 +50,7 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
         return None
     bench = term_bench(problem)
     grids = term_grids(bench, kind)
-    floor, before = problem.floor.tip_um, _rms(_gaps(problem, f))
+    floor, before = problem.floor.tip_um, rms_um(_gaps(problem, f))
     room = float(np.sqrt(max(before**2 - floor**2, 0.0)))
 
     def much(best: _Tried | None) -> bool:
@@ -75,7 +75,7 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
         base = _base(problem, fit, bench, kind)(best.found.folds.split, False)
         best = _beside(problem, fit, bench, fit_jointly(best.found, base))
     without = _gaps(problem, f if fit.members == f.members else problem.refit(fit.members))
-    law = law_result(bench, best.found, _rms(without), best.after)
+    law = law_result(bench, best.found, rms_um(without), best.after)
     return LawAnswer(
         law=law, before=tuple(without), gaps=tuple(best.gaps), signal=tuple(best.signal), found=best.found,
         problem=joint, fit=fit,
@@ -124,15 +124,15 @@ def _beside(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLa
         theta = found.folds.means(found.columns, found.precision)[:, problem.member_columns(f.members)]
         whole = found.folds.split.parts == 1  # runs are withheld
         gaps = [_gap(problem, f, k, theta[1 + k] if whole else theta[0]) for k in range(len(problem.bench.runs))]
-    return _Tried(f, found, gaps, signal, _rms(gaps, signal))
+    return _Tried(f, found, gaps, signal, rms_um(gaps, signal))
 
 
 def _terms(bench: TermBench, found: FoundLaw | FoundMap) -> list[tuple[Spot, list[Floats]]]:
     return terms_of(bench, found, [map_values(bench, m) for m in found.maps] if isinstance(found, FoundMap) else [])
 
 
-def _rms(gaps: Sequence[Floats], signal: Sequence[Floats] = ()) -> float:
-    """Of all rows, um."""
+def rms_um(gaps: Sequence[Floats], signal: Sequence[Floats] = ()) -> float:
+    """Rms (um) of gaps (n, 3) mm less signals (n, 3) mm over the rows with a measurement."""
     left = [g - s for g, s in zip(gaps, signal, strict=True)] if signal else gaps
     each = np.concatenate([np.nansum(g**2, axis=1)[np.isfinite(g).any(axis=1)] for g in left])
     return 1e3 * float(np.sqrt(np.mean(each))) if len(each) else 0.0

@@ -9,6 +9,7 @@ import numpy as np
 
 from camcomp.diagnosis.circles import OUTWARD, Turn, turns_of
 from camcomp.diagnosis.report.run_view import RunView
+from camcomp.diagnosis.report.words import cell
 from camcomp.diagnosis.result.standards import CircularTest
 from camcomp.ground.datatypes import Floats
 from camcomp.report.page import Section, Table
@@ -63,9 +64,9 @@ def circles_section(views: Sequence[RunView], tests: Sequence[CircularTest]) -> 
 def _values(tests: Sequence[CircularTest]) -> Table:
     rows = []
     for test in tests:
-        both = "–" if test.G_both_um is None else (test.G_both_um, brief(test.G_both_um))
+        both = "–" if test.G_both_um is None else cell(test.G_both_um)
         for turn in test.turns:
-            single, *ends = ((value, brief(value)) for value in (turn.G_um, turn.F_max_um, turn.F_min_um))
+            single, *ends = map(cell, (turn.G_um, turn.F_max_um, turn.F_min_um))
             rows.append([test.circle, turn.run, turn.direction, _load(test.cutting), single, both, *ends])
     heads = ("circle", "run", "direction", "load", "G µm", "G(b) µm", "F max µm", "F min µm")
     return Table("Circular deviations", heads, rows)

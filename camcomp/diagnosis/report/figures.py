@@ -53,10 +53,8 @@ def figure_signed(view: RunView, number: int) -> Figure:
     curves = []
     for c, channel in enumerate(view.channels):
         color = STYLES[c % len(STYLES)][0]
-        for name, values, dash in (("before", view.before, "solid"), ("with the causes found", view.after, "dot"))[
-            : 1 + view.explained
-        ]:
-            style = {"color": color, "dash": dash, "width": 2 if dash == "solid" else 1.5}
+        for i, (name, values) in enumerate(view.curves):
+            style = {"color": color, "dash": ("solid", "dot")[i], "width": (2, 1.5)[i]}
             curves.append(line(f"{channel}, {name}", x, numbers(values[index, c], 3), c) | {"line": style})
     means = [float(np.nanmean(each)) if np.isfinite(each).any() else 0.0 for each in view.before.T]
     words = ", ".join(f"{channel} {brief(mean)} µm" for channel, mean in zip(view.channels, means, strict=True))
@@ -72,18 +70,14 @@ def figure_signed(view: RunView, number: int) -> Figure:
 
 def figure_size(view: RunView, number: int, floor: float | None) -> Figure:
     """The size of the gap of one run over path length, before and after."""
-    before, after = view.sizes
-    index = thin(np.column_stack((before, after)))
+    sizes = [(name, np.linalg.norm(values, axis=1)) for name, values in view.curves]
+    index = thin(np.column_stack([size for _, size in sizes]))
     x = numbers(view.path[index], 4)
-    curves = [line("before", x, numbers(before[index], 3), 0)]
-    if view.explained:
-        curves.append(line("with the causes found", x, numbers(after[index], 3), 1))
+    curves = [line(name, x, numbers(size[index], 3), i) for i, (name, size) in enumerate(sizes)]
     if floor is not None:
         curves.append(level("noise floor", [float(view.path[0]), float(view.path[-1])], floor))
-    words = f"rms {brief(rms(before))} µm before"
-    words += (
-        f", {brief(rms(after))} µm with the causes found" if view.explained else ", and no cause found takes any of it"
-    )
+    words = "rms " + ", ".join(f"{brief(rms(size))} µm {name}" for name, size in sizes)
+    words += "" if view.explained else ", and no cause found takes any of it"
     return Figure(
         name=f"path-{number}",
         title=f"Run {view.name}: size of the gap along the path",
@@ -169,10 +163,8 @@ def figure_shares(where: Where) -> Figure | None:
 
 def figure_spectrum(view: RunView) -> Figure | None:
     """Amplitudes of the gap over frequency, before and after."""
-    curves = []
-    peaks = []
-    pair = (("before", view.before), ("with the causes found", view.after))
-    for i, (name, values) in enumerate(pair[: 1 + view.explained]):
+    curves, peaks = [], []
+    for i, (name, values) in enumerate(view.curves):
         frequency, amplitude = spectrum(view.time, values)
         if not len(frequency):
             return None

@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.diagnosis.report.run_view import rms
 from camcomp.diagnosis.result.types import CurveCause, DiagnosisResult, ErrorCurve
 from camcomp.ground.datatypes import Floats
 from camcomp.report.page import Section, Table
 from camcomp.report.plot import STYLES, Figure, Json, axis, brief, line, numbers
 
-MICRO = 1e6  # rad -> urad
-HALF_95 = 1.96
-SHARES = np.linspace(0.0, 1.0, 101)
 TEXT = (
     "What each joint stands off its encoder over a turn. The band holds the curve with 95 % at every angle; it is wide where "
     "no pose had the joint, and there nothing is taken out."
@@ -47,7 +45,7 @@ def joints_section(result: DiagnosisResult, residuals: Mapping[str, NDArray[Any]
 def _amplitude(cause: CurveCause) -> tuple[str, str]:
     size = cause.parameters["amplitude_rad"]
     low, high = size.ci95
-    return f"{MICRO * size.value:.0f}", f"{MICRO * low:.0f} to {MICRO * high:.0f}"
+    return f"{1e6 * size.value:.0f}", f"{1e6 * low:.0f} to {1e6 * high:.0f}"
 
 
 def _intervals(curve: ErrorCurve) -> str:
@@ -59,7 +57,7 @@ def _curve(name: str, curve: ErrorCurve) -> Figure:
     turn = (np.array(curve.angle_deg) + 180.0) % 360.0 - 180.0
     order = np.argsort(turn)
     angle = turn[order]
-    error, half = MICRO * np.array(curve.error_rad)[order], HALF_95 * MICRO * np.array(curve.sd_rad)[order]
+    error, half = 1e6 * np.array(curve.error_rad)[order], 1.96e6 * np.array(curve.sd_rad)[order]
     seen = np.any([(angle - low) % 360.0 <= high - low for low, high in curve.seen_deg], axis=0)
     x = numbers(angle, 1)
     edge: Json = {"type": "scatter", "mode": "lines", "x": x, "line": {"width": 0}, "hoverinfo": "skip"}
@@ -90,11 +88,12 @@ def _spread(residuals: Mapping[str, NDArray[Any]], runs: Sequence[str]) -> Figur
     if not unseen.any() or unseen.all():  # without a run held out, all were fitted
         return None
     before, after = (_sizes(residuals, kind, unseen) for kind in ("gap", "rest"))
+    shares = np.linspace(0.0, 1.0, 101)
     curves = [
-        line(name, numbers(np.quantile(size, SHARES), 2), numbers(100.0 * SHARES, 1), k)
+        line(name, numbers(np.quantile(size, shares), 2), numbers(100.0 * shares, 1), k)
         for k, (name, size) in enumerate((("before", before), ("with the causes found", after)))
     ]
-    words = f"rms {brief(_rms(before))} µm before, {brief(_rms(after))} µm with the causes found"
+    words = f"rms {brief(rms(before))} µm before, {brief(rms(after))} µm with the causes found"
     return Figure(
         name="unseen-poses",
         title=f"Unseen poses of {', '.join(runs)}: before and after",
@@ -109,7 +108,3 @@ def _spread(residuals: Mapping[str, NDArray[Any]], runs: Sequence[str]) -> Figur
 def _sizes(residuals: Mapping[str, NDArray[Any]], kind: str, rows: NDArray[np.bool_]) -> Floats:
     parts = [np.asarray(residuals[f"{kind}_{axis_name}_mm"], float)[rows] for axis_name in "xyz"]
     return np.asarray(1e3 * np.linalg.norm(parts, axis=0), float)
-
-
-def _rms(size: Floats) -> float:
-    return float(np.sqrt(np.mean(size**2)))

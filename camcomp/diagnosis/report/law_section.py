@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.diagnosis.report.answer import law_lines
-from camcomp.diagnosis.report.words import shortened
+from camcomp.diagnosis.report.words import cell, shortened
 from camcomp.diagnosis.result.types import Law
 from camcomp.ground.datatypes import Floats
 from camcomp.report.page import Section, Table
@@ -40,8 +40,7 @@ def law_section(law: Law, view: LawView | None) -> Section:
     if view is None:
         return Section(name="law", title="The law of what is left", text=text)
     rows: list[list[str | tuple[float, str]]] = [
-        [name, (float(b), brief(float(b))), (float(a), brief(float(a)))]
-        for (name, *_), (b, a) in zip(view.runs, view.sizes, strict=True)
+        [name, cell(before), cell(after)] for (name, *_), (before, after) in zip(view.runs, view.sizes, strict=True)
     ]
     table = Table(
         "Gap of every run without and with the law, which was fitted to the others",

@@ -24,7 +24,7 @@ from camcomp.diagnosis.report.joints import joints_section
 from camcomp.diagnosis.report.law_section import LawView, law_section
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView, rms
 from camcomp.diagnosis.report.standards import standards_section
-from camcomp.diagnosis.report.words import percent, plain, remedy, sizes
+from camcomp.diagnosis.report.words import cell, percent, plain, remedy, sizes
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, NextExperiment, UnseenShrinkage, Where
 from camcomp.report.inputs import Input, inputs_section
 from camcomp.report.page import Listing, Page, Section, Table, render
@@ -222,7 +222,7 @@ def _where(where: Where, shown: Sequence[RunView]) -> Section:
     tables = []
     if where.lines:
         lines: list[Row] = [
-            [e.run, (float(e.line), str(e.line)), (e.share, f"{100 * e.share:.1f} %"), (e.rms_um, brief(e.rms_um))]
+            [e.run, (float(e.line), str(e.line)), (e.share, f"{100 * e.share:.1f} %"), cell(e.rms_um)]
             for e in where.lines
         ]
         tables.append(
@@ -230,8 +230,7 @@ def _where(where: Where, shown: Sequence[RunView]) -> Section:
         )
     if where.intervals:
         intervals: list[Row] = [
-            [e.run, (e.t0_s, brief(e.t0_s)), (e.t1_s, brief(e.t1_s)), (e.share, f"{100 * e.share:.1f} %")]
-            for e in where.intervals
+            [e.run, cell(e.t0_s), cell(e.t1_s), (e.share, f"{100 * e.share:.1f} %")] for e in where.intervals
         ]
         tables.append(Table("Times with most of the gap", ("run", "from s", "to s", "share"), intervals, sortable=True))
     text = [f"The gap arises in the stage: {where.stage}."]

@@ -42,6 +42,11 @@ class RunView:
         return not np.array_equal(self.before, self.after, equal_nan=True)
 
     @property
+    def curves(self) -> list[tuple[str, Floats]]:
+        """The gap (n, c) before, and with the causes found where they change it, each with its name."""
+        return [("before", self.before), ("with the causes found", self.after)][: 1 + self.explained]
+
+    @property
     def path(self) -> Floats:
         """Path length (n,) mm."""
         step = np.linalg.norm(np.diff(self.position, axis=0), axis=1)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from camcomp.diagnosis.report.words import cell
 from camcomp.diagnosis.result.standards import StandardValues
 from camcomp.report.page import Section, Table
-from camcomp.report.plot import brief
 
 _SHOWN = ("A", "A_forward", "A_backward", "R", "R_forward", "R_backward", "B", "E", "M")
 _ISO_230_2 = (
@@ -24,7 +24,7 @@ def standards_section(values: StandardValues) -> Section | None:
         rows: list[list[str | tuple[float, str]]] = [
             [
                 each.axis, each.line, f"{each.targets} x {each.approaches}",
-                *((value := getattr(each, f"{name}_um"), brief(value)) for name in _SHOWN),
+                *(cell(getattr(each, f"{name}_um")) for name in _SHOWN),
             ]
             for each in values.positioning
         ]  # fmt: skip
@@ -33,14 +33,7 @@ def standards_section(values: StandardValues) -> Section | None:
         text.append(_ISO_230_2)
     if values.poses:
         poses: list[list[str | tuple[float, str]]] = [
-            [
-                each.campaign,
-                each.pose,
-                str(each.visits),
-                (each.AP_um, brief(each.AP_um)),
-                (each.RP_um, brief(each.RP_um)),
-            ]
-            for each in values.poses
+            [each.campaign, each.pose, str(each.visits), cell(each.AP_um), cell(each.RP_um)] for each in values.poses
         ]
         tables.append(Table("Poses", ("campaign", "joints", "visits", "AP µm", "RP µm"), poses))
         text.append(_ISO_9283)

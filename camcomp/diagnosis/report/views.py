@@ -15,8 +15,11 @@ from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.law.answer import rms_um
+from camcomp.diagnosis.law.bench_terms import Spot
+from camcomp.diagnosis.law.law_answer import LawAnswer, term_bench
 from camcomp.diagnosis.report.answer import cause_name
-from camcomp.diagnosis.report.law_view import law_view
+from camcomp.diagnosis.report.law_section import LawView
 from camcomp.diagnosis.report.page import diagnosis_html
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView
 from camcomp.diagnosis.result.types import DiagnosisResult, NamedCause
@@ -26,8 +29,6 @@ from camcomp.model.effect import Cause
 from camcomp.model.motion.twin import Twin
 from camcomp.report.inputs import Input
 from camcomp.report.page import Listing
-
-MICRO = 1e3  # mm -> um
 
 if TYPE_CHECKING:
     from camcomp.diagnosis.diagnose import Diagnosis
@@ -60,7 +61,7 @@ def report_of(
     return diagnosis_html(
         result, views, title=PurePath(file.path).name, machine=file.config.robot.name, inputs=inputs,
         notes=opened.notes if opened is not None else (), rivals=rivals, next_program=next_program,
-        law=law_view(done.problem, done.law) if done is not None and done.law is not None else None,
+        law=_law_view(done.problem, done.law) if done is not None and done.law is not None else None,
         residuals=residuals,
     )  # fmt: skip
 
@@ -97,8 +98,7 @@ def rivals_of(done: Diagnosis) -> list[RivalSignals]:
         causes = problem.causes(fit.members, fit.theta, fit.extra)
         names = [cause_name(NamedCause(effect=each.name, target=each.target)) for each in causes]
         signals = tuple(
-            MICRO * (problem.bench.gap(k) - problem.bench.gap(k, causes))[:, part]
-            for k in range(len(problem.bench.runs))
+            1e3 * (problem.bench.gap(k) - problem.bench.gap(k, causes))[:, part] for k in range(len(problem.bench.runs))
         )
         out.append(RivalSignals(" and ".join(names), signals))
     return out
@@ -116,8 +116,8 @@ def _view(problem: Problem, bench: Bench, k: int, causes: Sequence[Cause], *, he
         time=thinned(run.run_path.time[:, None], run.thin)[:, 0],
         line=thinned(run.measured.line[:, None], run.thin)[:, 0],
         position=thinned(bench.nominal[k].tip, run.thin),
-        before=MICRO * before[:, part],
-        after=MICRO * after[:, part],
+        before=1e3 * before[:, part],
+        after=1e3 * after[:, part],
         channels=("along the path", "across the path", "normal to both")
         if run.turn is not None and part.start == 0
         else tuple(each.replace("_", " ") for each in channel_names(bench.actuators)[part]),
@@ -125,3 +125,18 @@ def _view(problem: Problem, bench: Bench, k: int, causes: Sequence[Cause], *, he
         program=run.program,
         cutting=bool(np.any(path.row_force)),
     )
+
+
+def _law_view(problem: Problem, answer: LawAnswer) -> LawView:
+    """Residuals over the first covariate of the law, along the axis of the tip with its largest effect."""
+    bench, part = problem.bench, answer.law.parts[0]
+    spot = Spot("structure", 0) if part.target is None else Spot(part.stage, bench.actuators.index(part.target))
+    covariate = next(iter(part.envelope))
+    axis = int(np.argmax(np.sum([np.sum(s**2, axis=0) for s in answer.signal], axis=0)))
+    runs, sizes = [], []
+    every = zip(bench.runs, term_bench(problem).rows(spot), answer.before, answer.gaps, answer.signal, strict=True)
+    for run, own, before, gap, signal in every:
+        x = thinned(own[covariate][:, None], run.thin)[:, 0]
+        runs.append((run.name, x, 1e3 * gap[:, axis], 1e3 * signal[:, axis]))
+        sizes.append((rms_um([before]), rms_um([gap], [signal])))
+    return LawView(covariate, "xyz"[axis], tuple(runs), np.array(sizes))

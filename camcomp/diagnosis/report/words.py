@@ -10,7 +10,7 @@ from camcomp.diagnosis.result.types import Driver, Estimate, FoundCause, LawTerm
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
-from camcomp.report.plot import format_together
+from camcomp.report.plot import brief, format_together
 
 _SMALLER = {  # units of small values
     "mm": (1e3, "µm"), "rad": (1e3, "mrad"), "s": (1e3, "ms"), "mm/N": (1e3, "µm/N"), "rad/Nmm": (1e9, "µrad/Nm"),
@@ -45,6 +45,11 @@ def plain(cause: NamedCause) -> str:
 def remedy(cause: NamedCause) -> str:
     """Remedy of an effect; may be empty."""
     return str(getattr(_effect(cause.effect), "REMEDY", ""))
+
+
+def cell(value: float) -> tuple[float, str]:
+    """A number of a table: value to sort by, and its text."""
+    return float(value), brief(value)
 
 
 def percent(share: float) -> str:

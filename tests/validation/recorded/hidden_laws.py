@@ -145,7 +145,7 @@ def judged(effect: str, target: str, machine: str, seed: int, ratio: float, fold
     """Makes one experiment, asks, and compares."""
     from camcomp.diagnosis.diagnose import diagnose
     from camcomp.diagnosis.experiment.open_experiment import open_experiment
-    from camcomp.diagnosis.law.answer import _rms, answer_law
+    from camcomp.diagnosis.law.answer import answer_law, rms_um
 
     made = Experiment(effect, target, machine, seed, ratio, rows)
     own = made.write(folder)
@@ -168,8 +168,8 @@ def judged(effect: str, target: str, machine: str, seed: int, ratio: float, fold
         return {**row, "law": False, "formula": None, "form": False, "place": False, "off": None}
     truth = TRUTH[effect]
     best = [g - at_rows(o, t, now) for g, o, t, now in zip(gaps, own, made.times, done.problem.times, strict=True)]
-    before = _rms(gaps)
-    off = abs(law.after_rms_um - _rms(best)) / before
+    before = rms_um(gaps)
+    off = abs(law.after_rms_um - rms_um(best)) / before
     return {
         **row, "law": True, "kind": law.kind, "formula": law.formula, "off": off,
         "form": form_right(answer.found, truth), "place": place_right(law, truth, target),
