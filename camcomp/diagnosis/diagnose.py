@@ -22,8 +22,7 @@ from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
 from camcomp.diagnosis.fit.open_problem import open_problem
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.law.answer import answer_law
-from camcomp.diagnosis.law.law_answer import LawAnswer
+from camcomp.diagnosis.law.answer import LawAnswer, answer_law
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.next_experiment.after_unknown import explore

@@ -9,12 +9,10 @@ from camcomp.diagnosis.diagnose import diagnose
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
 from camcomp.diagnosis.fit.open_problem import open_problem
-from camcomp.diagnosis.law.answer import _base, answer_law
+from camcomp.diagnosis.law.answer import _base, answer_law, fit_needed, term_bench, with_law
 from camcomp.diagnosis.law.bench_terms import Spot, Term
 from camcomp.diagnosis.law.folds import usual_split
 from camcomp.diagnosis.law.forms import at_tip
-from camcomp.diagnosis.law.joint_law import fit_needed, with_law
-from camcomp.diagnosis.law.law_answer import term_bench
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.ground import shelf
@@ -113,9 +111,9 @@ def test_a_cause_that_followed_a_law_goes_once_it_is_known_and_another_stays(tmp
     assert fit_needed(problem, (0, 1)).members == (0, 1)
     bench, spot = term_bench(problem), Spot("structure", 0)
     forms = [f for f in at_tip(bench.sizes(spot)) if f.family == "settling" and "force_N" in f.about]
-    values = bench.values(spot, forms[1])
-    law = SimpleNamespace(precision=np.full(2, 1.0), columns=(bench.white(spot, values),))
-    f = fit_needed(with_law(problem, bench, law, [(spot, values)]), (0, 1))
+    white = bench.white(spot, bench.values(spot, forms[1]))
+    law = SimpleNamespace(precision=np.full(2, 1.0), columns=(white,), terms=(Term(spot, forms[1]),))
+    f = fit_needed(with_law(problem, bench, law), (0, 1))
     assert f.members == (1,)
     (cause,) = problem.causes(f.members, f.theta, f.extra)
     assert cause.values["error_ppm"] == pytest.approx(300.0, abs=30.0)

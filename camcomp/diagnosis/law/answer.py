@@ -3,27 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from camcomp.diagnosis.fit.floor import GATE
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.law.bench_terms import Spot, TermBench, spots
-from camcomp.diagnosis.law.describe import law_result, moved_without, terms_of
+from camcomp.diagnosis.law.bench_terms import TermBench, spots
+from camcomp.diagnosis.law.describe import law_result, moved_without
 from camcomp.diagnosis.law.find import FoundLaw, find_law
 from camcomp.diagnosis.law.folds import Folds, Split, usual_split
-from camcomp.diagnosis.law.joint_law import fit_jointly, fit_needed, with_law
-from camcomp.diagnosis.law.law_answer import LawAnswer, term_bench
 from camcomp.diagnosis.law.screen import term_grids
-from camcomp.diagnosis.law.smooth import FoundMap, find_map, map_values
+from camcomp.diagnosis.law.smooth import find_map
+from camcomp.diagnosis.result.types import Law
+from camcomp.diagnosis.search.tempering import tempering
 from camcomp.diagnosis.search.unknown import about, firm_prior
-from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, total
+from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats
 
 BETTER = 0.8  # of what a law leaves: what another one or a map has to leave to be told instead
 LEAST_SHRINKAGE = 0.1  # of the gap on withheld parts, below which nothing was found
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LawAnswer:
+    """law: as in the result; before: gaps (n, 3) mm of the tip per run that the causes alone leave; gaps: what they leave as they
+    stand beside the law; signal: what it does to the tip (n, 3) mm per run; all fitted without what they are judged on; found: its
+    terms; problem: with the law in it; fit: the causes that stand there, fitted together with it.
+    """
+
+    law: Law
+    before: tuple[Floats, ...]
+    gaps: tuple[Floats, ...]
+    signal: tuple[Floats, ...]
+    found: FoundLaw
+    problem: Problem
+    fit: Fitted
+
+
+def term_bench(problem: Problem) -> TermBench:
+    """Where terms are evaluated for a problem."""
+    return TermBench(problem.bench, problem.noise, problem.inflate, problem.times)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +56,7 @@ class _Tried:
     """
 
     f: Fitted | None
-    found: FoundLaw | FoundMap
+    found: FoundLaw
     gaps: list[Floats]
     signal: list[Floats]
     after: float
@@ -69,11 +92,11 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
             best = smooth
     if best is None or best.after > (1.0 - LEAST_SHRINKAGE) * before:
         return None
-    joint = with_law(problem, bench, best.found, _terms(bench, best.found))
+    joint = with_law(problem, bench, best.found)
     fit = fit_needed(joint, f.members)
     if best.f is not None or fit.members:  # about the values that the causes have beside it
         base = _base(problem, fit, bench, kind)(best.found.folds.split, False)
-        best = _beside(problem, fit, bench, fit_jointly(best.found, base))
+        best = _beside(problem, fit, bench, replace(best.found, folds=base))
     without = _gaps(problem, f if fit.members == f.members else problem.refit(fit.members))
     law = law_result(bench, best.found, rms_um(without), best.after)
     return LawAnswer(
@@ -113,13 +136,13 @@ def _gap(problem: Problem, f: Fitted, k: int, theta: Floats) -> Floats:
     return problem.bench.gap(k, problem.causes(f.members, theta, f.extra))[:, :3]
 
 
-def _tried(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw | FoundMap | None) -> _Tried | None:
+def _tried(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw | None) -> _Tried | None:
     return None if found is None else _beside(problem, f, bench, found)
 
 
-def _beside(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw | FoundMap) -> _Tried:
+def _beside(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw) -> _Tried:
     """Gaps and tip motion of a law, with the values of the causes that were fitted jointly with it."""
-    signal, gaps = moved_without(bench, found, _terms(bench, found)), _gaps(problem, None)
+    signal, gaps = moved_without(bench, found), _gaps(problem, None)
     if f is not None and f.members:
         theta = found.folds.means(found.columns, found.precision)[:, problem.member_columns(f.members)]
         whole = found.folds.split.parts == 1  # runs are withheld
@@ -127,12 +150,55 @@ def _beside(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLa
     return _Tried(f, found, gaps, signal, rms_um(gaps, signal))
 
 
-def _terms(bench: TermBench, found: FoundLaw | FoundMap) -> list[tuple[Spot, list[Floats]]]:
-    return terms_of(bench, found, [map_values(bench, m) for m in found.maps] if isinstance(found, FoundMap) else [])
-
-
 def rms_um(gaps: Sequence[Floats], signal: Sequence[Floats] = ()) -> float:
     """Rms (um) of gaps (n, 3) mm less signals (n, 3) mm over the rows with a measurement."""
     left = [g - s for g, s in zip(gaps, signal, strict=True)] if signal else gaps
     each = np.concatenate([np.nansum(g**2, axis=1)[np.isfinite(g).any(axis=1)] for g in left])
     return 1e3 * float(np.sqrt(np.mean(each))) if len(each) else 0.0
+
+
+def with_law(problem: Problem, bench: TermBench, found: FoundLaw) -> Problem:
+    """The problem with the terms of a law as further nuisances, with the prior of its coefficients."""
+    more, old = len(found.precision), problem.prior
+    prior = Prior(
+        np.concatenate([old.tolerance, found.precision**-0.5]),
+        np.concatenate([old.scale, np.ones(more)]),
+        np.concatenate([old.sign, np.zeros(more)]),
+        np.concatenate([old.flexible, np.zeros(more)]),
+        np.concatenate([old.reach, np.full(more, np.inf)]),
+    )
+    own = [bench.channels(t.spot, bench.values(t.spot, t.form)) for t in found.terms]
+    blocks = tuple(
+        block.appended(channel_behind_channel(np.concatenate([each[k] for each in own], axis=2)))
+        for k, block in enumerate(problem.columns.blocks)
+    )
+    columns = replace(
+        problem.columns,
+        candidate=np.concatenate([problem.columns.candidate, np.full(more, -1)]),
+        names=(*problem.columns.names, *(f"law.{i}" for i in range(more))),
+        prior=prior,
+        blocks=blocks,
+    )
+    white = [
+        W.appended(np.concatenate([x.over(k, 0, len(W)) for x in found.columns], axis=1))
+        for k, W in enumerate(problem.white)
+    ]
+    return replace(problem, columns=columns, white=white)
+
+
+def fit_needed(problem: Problem, members: Members) -> Fitted:
+    """The fit of the members that evidence supports and that are not small; a cause named without a law may have followed it."""
+    while members:
+        f = problem.refit(members)
+        smaller = [tuple(each for each in members if each != i) for i in members]
+        scale, prior = Scale(total(f.grams), problem.prior, problem.candidates), problem.candidates.prior
+        temperature, whole = tempering(problem, f), scale(members)
+        odds = [(whole - scale(less)) / temperature + prior(members) - prior(less) for less in smaller]
+        small = problem.small_members(f)
+        if min(odds) < 0.0:
+            members = smaller[int(np.argmin(odds))]
+        elif small:
+            members = tuple(i for i in members if i not in small)
+        else:
+            return f
+    return problem.refit(())

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, means, thinned
-from camcomp.diagnosis.law.forms import Form
-from camcomp.diagnosis.law.rows import Rows, drive_rows, tip_rows
+from camcomp.diagnosis.law.folds import White
+from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.sizes import Sizes, sizes
-from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.model.effect import Load
+from camcomp.model.law.covariates import DriveRows, TipRows
 from camcomp.model.law.expression import parse
+from camcomp.model.law.spline_map import splines, tensor
+from camcomp.model.statics.description import Robot
 
-AT_ONCE = 100  # forms that are evaluated together
-ROWS_AT_ONCE = 16_000  # rows of several runs for which a function is worked out in one go
+AT_ONCE_BYTES = 12e6  # of functions that are worked out together, before rows are thinned
+Rows = TipRows | DriveRows
 
 
 @dataclass(frozen=True)
@@ -31,10 +34,15 @@ class Spot:
 
 @dataclass(frozen=True)
 class Term:
-    """A form at a spot: one or two columns that belong together."""
+    """A form at a spot: columns that belong together."""
 
     spot: Spot
-    form: Form
+    form: Form | SmoothForm
+
+    @property
+    def kind(self) -> tuple[Spot, str, tuple[str, ...]]:
+        """All but its shape."""
+        return self.spot, self.form.family, self.form.about
 
 
 def spots(actuators: int, kind: str) -> list[Spot]:
@@ -42,18 +50,6 @@ def spots(actuators: int, kind: str) -> list[Spot]:
     if kind == "encoder":
         return [Spot("control", j) for j in range(actuators)]
     return [Spot("structure", a) for a in range(3)] + [Spot("drive", j) for j in range(actuators)]
-
-
-class _Joined(dict[str, Floats]):
-    """Covariates of all runs, one run behind the other, worked out when asked for."""
-
-    def __init__(self, runs: Sequence[Rows]) -> None:
-        super().__init__()
-        self._runs = runs
-
-    def __missing__(self, name: str) -> Floats:
-        self[name] = np.concatenate([each[name] for each in self._runs])
-        return self[name]
 
 
 class TermBench:
@@ -72,9 +68,9 @@ class TermBench:
         if key not in self._rows:
             bench = self.bench
             self._rows[key] = (
-                list(tip_rows(bench))
+                list(_tip_rows(bench))
                 if key[0] == "tip"
-                else list(drive_rows(bench, spot.index, setpoints=spot.on == "control"))
+                else list(_drive_rows(bench, spot.index, setpoints=spot.on == "control"))
             )
         return self._rows[key]
 
@@ -82,25 +78,13 @@ class TermBench:
         """Reach of the covariates there."""
         return sizes(self.rows(spot))
 
-    def values(self, spot: Spot, *forms: Form) -> list[Floats]:
+    def values(self, spot: Spot, *forms: Form | SmoothForm) -> list[Floats]:
         """Functions of forms (n, f), one behind the other, per run: mm or rad per unit of their coefficients; 0 where they are none."""
-        rows, known = self.rows(spot), dict.fromkeys(self.rows(spot)[0])
-        parsed = [parse(text, known) for form in forms for text in form.said]
-        out = [np.empty((len(parsed), r.rows)) for r in rows]  # rows of a function lie together, as they are worked out
-        for some in _in_cache([r.rows for r in rows]):
-            every = _Joined([rows[k] for k in some])
-            ends = np.cumsum([rows[k].rows for k in some])
-            for i, each in enumerate(parsed):
-                if each.remembers:
-                    for k in some:
-                        out[k][i] = each(rows[k], rows[k].rows)
-                else:
-                    for k, values in zip(some, np.split(each(every, int(ends[-1])), ends[:-1]), strict=True):
-                        out[k][i] = values
-        for own in out:
-            if not np.isfinite(own).all():
-                np.nan_to_num(own, copy=False)
-        return [own.T for own in out]
+        known = dict.fromkeys(self.rows(spot)[0])
+        functions = [_functions(form, known) for form in forms]
+        # rows of a function lie together, as they are worked out
+        each = (np.concatenate([f(rows) for f in functions]) for rows in self.rows(spot))
+        return [np.nan_to_num(values, copy=False).T for values in each]
 
     def tip_ways(self, spot: Spot) -> list[Floats]:
         """By how much the tip (n, 3), program frame, moves per unit at the spot, per run."""
@@ -169,8 +153,12 @@ class TermBench:
 
     def white_rows(self, spot: Spot) -> int:
         """How many white rows of all runs the spot reaches."""
-        ones = [np.ones((len(way), 1)) for way in self.tip_ways(spot)]
-        return sum(map(len, self.white(spot, ones).rows))
+        return sum(len(own.get(c, ())) for k, own in enumerate(self._slices) for c in self._reach(spot, k)[0])
+
+    @cached_property
+    def at_once(self) -> int:
+        """Forms whose functions of all rows fit into AT_ONCE_BYTES."""
+        return max(int(AT_ONCE_BYTES / (16.0 * sum(len(run.run_path.time) for run in self.bench.runs))), 4)
 
     def seen(self, spot: Spot) -> list[Bools]:
         """Rows (n',) per run, thinned, in which some channel that the spot reaches is known."""
@@ -207,12 +195,43 @@ class TermBench:
         return White(tuple(rows), tuple(columns))
 
 
-def _in_cache(lengths: Sequence[int]) -> list[list[int]]:
-    """Numbers of runs of some lengths, those next to each other together as long as the processor keeps their rows at hand."""
-    out: list[list[int]] = []
-    for k, n in enumerate(lengths):
-        if out and n + sum(lengths[i] for i in out[-1]) <= ROWS_AT_ONCE:
-            out[-1].append(k)
-        else:
-            out.append([k])
+def _functions(form: Form | SmoothForm, known: Mapping[str, object]) -> Callable[[Rows], Floats]:
+    """Functions (f, n) of a form, as a function of rows with known covariates."""
+    if isinstance(form, SmoothForm):
+        along = list(zip(form.about, form.limits, form.counts, strict=True))
+        return lambda rows: tensor([splines(rows[name], *limits, count) for name, limits, count in along]).T
+    parsed = [parse(text, known) for text in form.said]
+    return lambda rows: np.array([each(rows, rows.rows) for each in parsed])
+
+
+def _load_names(robot: Robot, j: int) -> tuple[str, ...]:
+    """The covariates that are loads of drives, where actuator j is meant: its own first, then those of the others that a formula
+    can name.
+    """
+    units = [(each.name, "Nmm" if each.revolute else "N") for each in robot.actuators]
+    own = f"load_{units[j][1]}"
+    return (
+        own,
+        *(f"load_{name}_{unit}" for k, (name, unit) in enumerate(units) if k != j and f"load_{name}".isidentifier()),
+    )
+
+
+def _tip_rows(bench: Bench) -> list[TipRows]:
+    """Per run."""
+    readings = bench.nominal
+    return [TipRows(r.tip, Load(r.dyno, np.zeros((len(r.tip), 6))), r.motion) for r in readings]
+
+
+def _drive_rows(bench: Bench, j: int, *, setpoints: bool) -> list[DriveRows]:
+    """Per run, of actuator j; setpoints: what the control was told instead of where the encoder was."""
+    others = () if setpoints else _load_names(bench.twin.robot, j)
+    out = []
+    for run, reading in zip(bench.runs, bench.nominal, strict=True):
+        motion = reading.motion
+        if setpoints:
+            motion = replace(motion, encoder=run.run_path.row_rho)
+        elif run.by == "setpoint" and run.measured.has("encoder"):
+            seen = run.measured.encoder
+            motion = replace(motion, encoder=np.where(np.isfinite(seen), seen, motion.encoder))
+        out.append(DriveRows(motion, j, others))
     return out

@@ -7,18 +7,18 @@ data). Source: forward selection as in sparse regression of dynamics; wild boots
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench
-from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, gains, usual_split, withheld
-from camcomp.diagnosis.law.forms import Form
+from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, White, gains, usual_split, withheld
+from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.screen import Screen, TermGrid
 from camcomp.diagnosis.law.shapes import Shapes
-from camcomp.diagnosis.law.white import White
 from camcomp.ground.datatypes import Floats
 
 MOST_TERMS = 6
@@ -35,20 +35,49 @@ _PLAIN = ("line", "power", "product", "rate", "force")  # simpler kinds of the s
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FoundLaw:
-    """terms with theta (c,), covariance (c, c) of their columns in order, theta_without (f, c): fitted without each part;
-    gain: log density on withheld parts; alike: other terms for each that the data cannot tell from it; columns: white, with
-    their prior precision (c,).
+    """terms, and for each of them other terms that the data cannot tell from it; columns (c of all terms in order): white, with
+    their prior precision (c,); folds: the base that they are fitted with.
     """
 
     terms: tuple[Term, ...]
-    theta: Floats
-    covariance: Floats
-    theta_without: Floats
-    gain: float
-    alike: tuple[tuple[Term, ...], ...]
     folds: Folds
     columns: tuple[White, ...]
     precision: Floats
+    alike: tuple[tuple[Term, ...], ...] = ()
+
+    @property
+    def is_map(self) -> bool:
+        """Whether it is a smooth map instead of a formula."""
+        return isinstance(self.terms[0].form, SmoothForm)
+
+    @property
+    def theta(self) -> Floats:
+        """Coefficients (c,)."""
+        return np.asarray(self._fit[0][0])
+
+    @property
+    def theta_without(self) -> Floats:
+        """Coefficients (f, c), each fitted without one of the parts."""
+        return self._fit[0][1:]
+
+    @property
+    def covariance(self) -> Floats:
+        """Of the coefficients, (c, c)."""
+        return self._fit[1]
+
+    @cached_property
+    def _fit(self) -> tuple[Floats, Floats]:
+        return self.folds.coefficients(self.columns, self.precision)
+
+    def by_term(self, theta: Floats) -> list[Floats]:
+        """Coefficients (..., c) of all terms, split by term."""
+        return np.split(theta, np.cumsum([term.form.size for term in self.terms])[:-1], axis=-1)
+
+
+def fitted(shapes: Shapes, terms: Sequence[Term], folds: Folds) -> FoundLaw:
+    """Terms fitted jointly with a base."""
+    columns, precision = zip(*map(shapes.columns, terms), strict=True)
+    return FoundLaw(terms=tuple(terms), folds=folds, columns=columns, precision=np.concatenate(precision))
 
 
 def find_law(
@@ -121,36 +150,26 @@ class _Search:
         """The base with the terms chosen so far in it."""
         if not chosen:
             return self.folds
-        more = [self._white(term) for term in chosen]
-        return self.folds.extended(more, np.concatenate([self._precision(term) for term in chosen]))
-
-    def _white(self, term: Term) -> White:
-        return self.shapes.columns(term)[0]
-
-    def _precision(self, term: Term) -> Floats:
-        return self.shapes.columns(term)[1]
+        found = fitted(self.shapes, chosen, self.folds)
+        return self.folds.extended(found.columns, found.precision)
 
     @staticmethod
     def _leaders(ranked: Sequence[tuple[float, Term]]) -> list[tuple[float, Term]]:
         """The best of every kind of term at every spot, as far as they are near the best of all."""
         out: dict[tuple[object, ...], tuple[float, Term]] = {}
         for gain, term in ranked:
-            key = (term.spot, term.form.family, term.form.about)
             if gain < 0.4 * ranked[0][0] or len(out) >= 3 * REFINED:
                 break
-            out.setdefault(key, (gain, term))
+            out.setdefault(term.kind, (gain, term))
         shaped = [each for each in out.values() if each[1].form.shape][:REFINED]
         plain = [each for each in out.values() if not each[1].form.shape]
         return [*shaped, *plain]
 
-    def _gain(self, step: Folds, term: Term) -> Floats:
-        data = step.columns(self._white(term))
-        return gains(data.G[:, None], data.h[:, None], self._precision(term)[None])[:, 0]
-
     def _refined(self, step: Folds, term: Term) -> tuple[float, Term]:
         """(log density on withheld parts less what shapes cost, term with the shape that the data want)."""
         term = self.shapes.followed(step, term)
-        return float(withheld(self._gain(step, term)[:, None])[0]) - self._costs([term]), term
+        white, size = self.shapes.columns(term)
+        return withheld(gains(*step.together([white]), size)) - self._costs([term]), term
 
     @staticmethod
     def _costs(terms: Sequence[Term]) -> float:
@@ -169,15 +188,13 @@ class _Search:
 
     def _scores(self, terms: Sequence[Term]) -> Callable[[Sequence[int]], float]:
         """Function of term numbers: log density on withheld parts minus the cost of these terms."""
-        data = self.folds.together([self._white(t) for t in terms])
-        size = np.concatenate([self._precision(t) for t in terms])
-        ends = np.cumsum([len(t.form.texts) for t in terms])
-        own = [np.arange(end - len(t.form.texts), end) for end, t in zip(ends, terms, strict=True)]
+        found = fitted(self.shapes, terms, self.folds)
+        G, h = self.folds.together(found.columns)
+        own = found.by_term(np.arange(float(len(found.precision))))
 
         def score(some: Sequence[int]) -> float:
-            at = np.concatenate([own[i] for i in some])
-            G, h = data.G[:, at][:, :, at], data.h[:, at]
-            gain = float(withheld(gains(G[:, None], h[:, None], size[at][None]))[0])
+            at = np.concatenate([own[i] for i in some]).astype(int)
+            gain = withheld(gains(G[:, at][:, :, at], h[:, at], found.precision[at]))
             return gain - self._costs([terms[i] for i in some])
 
         return score
@@ -197,43 +214,29 @@ class _Search:
     def _without_idle(self, chosen: list[Term]) -> list[Term]:
         """The terms whose share of the law's energy exceeds LEAST_SHARE."""
         while len(chosen) > 1:
-            theta = self._coefficients(chosen)[0][0]
-            size, at = [], 0
-            for t in chosen:
-                values = self.bench.values(t.spot, t.form)
-                own = [v @ theta[at : at + v.shape[1]][:, None] for v in values]
-                size.append(float(self.bench.rms(t.spot, own)[0]) ** 2)
-                at += len(t.form.texts)
+            size = list(strengths(self.bench, fitted(self.shapes, chosen, self.folds)))
             if min(size) > LEAST_SHARE * sum(size):
                 break
             chosen.pop(int(np.argmin(size)))
         return chosen
 
-    def _coefficients(self, terms: Sequence[Term]) -> tuple[Floats, Floats]:
-        return self.folds.coefficients(
-            [self._white(t) for t in terms], np.concatenate([self._precision(t) for t in terms])
-        )
-
     def _answer(self, chosen: list[Term], pool: Sequence[Term]) -> FoundLaw:
-        theta, covariance = self._coefficients(chosen)
         own, others = len(chosen), [each for each in dict.fromkeys(pool) if each not in chosen]
         of = self._scores([*chosen, *others])
         gain = of(range(own))
         alike = []
         for i, term in enumerate(chosen):
-            same = (term.spot, term.form.family, term.form.about)
-            found = []
-            for j, other in enumerate(others):
-                if (other.spot, other.form.family, other.form.about) == same:
-                    continue
-                if of([*range(i), own + j, *range(i + 1, own)]) > gain - SAME:
-                    found.append(other)
-            alike.append(tuple(found))
-        columns, precision = tuple(map(self._white, chosen)), np.concatenate([self._precision(t) for t in chosen])
-        return FoundLaw(
-            terms=tuple(chosen), theta=theta[0], covariance=covariance, theta_without=theta[1:], gain=gain,
-            alike=tuple(alike), folds=self.folds, columns=columns, precision=precision,
-        )  # fmt: skip
+            instead = [(j, other) for j, other in enumerate(others, own) if other.kind != term.kind]
+            same = [other for j, other in instead if of([*range(i), j, *range(i + 1, own)]) > gain - SAME]
+            alike.append(tuple(same))
+        return replace(fitted(self.shapes, chosen, self.folds), alike=tuple(alike))
+
+
+def strengths(bench: TermBench, found: FoundLaw) -> Iterator[float]:
+    """Mean square of what each term does to the tip, mm2."""
+    for term, theta in zip(found.terms, found.by_term(found.theta), strict=True):
+        values = [v @ theta[:, None] for v in bench.values(term.spot, term.form)]
+        yield float(bench.rms(term.spot, values)[0]) ** 2
 
 
 def margin(tried: Sequence[Term], best: Sequence[Term]) -> float:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats, Ints
 
@@ -21,6 +20,34 @@ FEW_RUNS = 4  # from which on runs are withheld, else stretches of them
 PARTS = 6
 SHORT = 48  # stretches of a run, every other one of which is withheld where something acts for a while only
 WIDE_MM = 0.2  # what a law may move the tip by, standard deviation before any data
+
+
+@dataclass(frozen=True, eq=False)
+class White:
+    """Per run: which white rows a spot reaches (r,), in their order, and columns (r, k) there."""
+
+    rows: tuple[Ints, ...]
+    columns: tuple[Floats, ...]
+
+    def hull(self, run: int) -> tuple[int, int]:
+        """The first white row that is reached, and the one behind the last."""
+        rows = self.rows[run]
+        return (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (0, 0)
+
+    def reach(self, run: int) -> Ints | slice:
+        """The rows, as a slice where none lies between them: nothing has to be copied then."""
+        low, high = self.hull(run)
+        return slice(low, high) if high - low == len(self.rows[run]) else self.rows[run]
+
+    def over(self, run: int, low: int, high: int) -> Floats:
+        """Columns (high - low, k) over white rows low to high, 0 where the spot does not reach."""
+        rows, columns = self.rows[run], self.columns[run]
+        if (low, high) == self.hull(run) and len(rows) == high - low:
+            return columns
+        out = np.zeros((high - low, columns.shape[1]))
+        near = (rows >= low) & (rows < high)
+        out[rows[near] - low] = columns[near]
+        return out
 
 
 @dataclass(frozen=True)
@@ -48,11 +75,16 @@ def usual_split(runs: int) -> Split:
 
 
 @dataclass(frozen=True, eq=False)
-class FoldedColumns:
-    """Columns (c) with the base taken out, for all data and for all but one part each: G (f, c, c), h (f, c)."""
+class Products:
+    """Columns (c) of a spot, of which each `count` belong together, with base columns (k): cross (k, c); with the residual:
+    target (c,); with each other: own (c / count, count, count). more: how many columns that stand apart are in the base.
+    """
 
-    G: Floats
-    h: Floats
+    cross: Floats
+    target: Floats
+    own: Floats
+    count: int
+    more: int
 
 
 class Folds:
@@ -135,12 +167,25 @@ class Folds:
 
     def coefficients(self, columns: Sequence[White], precision: Floats) -> tuple[Floats, Floats]:
         """Those (f, c) of law columns of that prior precision, of all data and without each part, and their covariance (c, c)."""
-        data = self.together(columns)
-        M = data.G + np.diag(precision)
-        each = np.asarray(np.linalg.solve(M, data.h[..., None])[..., 0], float)
+        G, h = self.together(columns)
+        M = G + np.diag(precision)
+        each = np.asarray(np.linalg.solve(M, h[..., None])[..., 0], float)
         return each, np.asarray(np.linalg.inv(M[0]), float)
 
-    def cross(self, x: White, *, first: int | None = None) -> Floats:
+    def products(self, x: White, count: int) -> Products:
+        """Products of columns of a spot with the base: they serve every larger base, too."""
+        target = sum(X.T @ r[x.reach(k)] for k, (X, r) in enumerate(zip(x.columns, self.residual, strict=True)))
+        return Products(self._cross(x), np.asarray(target), _grams(x.columns, count), count, len(self.more))
+
+    def alone(self, x: White, products: Products) -> tuple[Floats, Floats, Floats]:
+        """Columns (c) with the base taken out, all data: G (f, count, count) and h (f, count) of those that belong together,
+        and what takes the base out of their products with other rows (k, c).
+        """
+        half = self._halved(np.concatenate([products.cross, self._cross(x, first=products.more)]))
+        h = (products.target - half.T @ self._targets[0]).reshape(-1, products.count)
+        return products.own - _grams([half], products.count), h, half
+
+    def _cross(self, x: White, *, first: int | None = None) -> Floats:
         """Products (k, c) of the base's columns with columns of a spot: of all, or from number `first` of those that stand apart on."""
         return np.asarray(np.sum([self._against(k, x, first) for k in range(len(self.white))], axis=0))
 
@@ -153,52 +198,26 @@ class Folds:
             parts.append((near if isinstance(rows, slice) else near[rows - low]).T @ X)
         return np.concatenate(parts) if parts else np.zeros((0, X.shape[1]))
 
-    def halved(self, cross: Floats) -> Floats:
+    def _halved(self, cross: Floats) -> Floats:
         """Products (k, c) with the base divided by the root of its precision: what its columns take is half.T @ half."""
         return np.asarray(solve_triangular(self._halves[0], cross, lower=True))
 
     def projected(self, draws: Sequence[Floats]) -> Floats:
         """White residuals (w, b) per run against the base (k, b)."""
         every = White(tuple(np.arange(len(e)) for e in draws), tuple(draws))
-        return self.halved(self.cross(every))
+        return self._halved(self._cross(every))
 
-    def target(self, x: White) -> Floats:
-        """Products (c,) of columns of a spot with the residual."""
-        return np.asarray(
-            sum(X.T @ r[x.reach(k)] for k, (X, r) in enumerate(zip(x.columns, self.residual, strict=True)))
-        )
-
-    def of_target(self, half: Floats) -> Floats:
-        """Products (c,) that the base explains."""
-        return np.asarray(half.T @ self._targets[0])
-
-    def of_all(self, x: White) -> FoldedColumns:
-        """As `columns`, for all data alone: (1, c, c), (1, c)."""
-        half = self.halved(self.cross(x))
-        gram = sum(X.T @ X for X in x.columns)
-        return FoldedColumns((gram - half.T @ half)[None], (self.target(x) - self.of_target(half))[None])
-
-    def columns(self, x: White) -> FoldedColumns:
-        """Columns of one spot with the base taken out, in full."""
-        return self.together([x])
-
-    def together(self, xs: Sequence[White]) -> FoldedColumns:
-        """The same for columns of several spots, one behind the other."""
-        crosses, grams, targets = zip(*self._products(xs), strict=True)
+    def together(self, xs: Sequence[White]) -> tuple[Floats, Floats]:
+        """Columns (c) of several spots, one behind the other, with the base taken out, for all data and for all but one part
+        each: G (f, c, c), h (f, c).
+        """
+        every = [_without_each(parts) for parts in zip(*self._products(xs), strict=True)]
         G, h = [], []
-        every = zip(
-            self._halves,
-            self._targets,
-            _without_each(crosses),
-            _without_each(grams),
-            _without_each(targets),
-            strict=True,
-        )
-        for L, t, c, g, b in every:
-            half = solve_triangular(L, c, lower=True)
-            G.append(g - half.T @ half)
-            h.append(b - half.T @ t)
-        return FoldedColumns(np.array(G), np.array(h))
+        for L, t, cross, gram, target in zip(self._halves, self._targets, *every, strict=True):
+            half = solve_triangular(L, cross, lower=True)
+            G.append(gram - half.T @ half)
+            h.append(target - half.T @ t)
+        return np.array(G), np.array(h)
 
     def _products(self, xs: Sequence[White]) -> list[tuple[Floats, Floats, Floats]]:
         """Per part: columns of several spots (c) against the base (k, c), each other (c, c) and the residual (c,)."""
@@ -221,14 +240,20 @@ def _without_each(parts: Sequence[Floats]) -> list[Floats]:
     return [whole, *(whole - each for each in parts)]
 
 
+def _grams(parts: Sequence[Floats], count: int) -> Floats:
+    """Products (f, count, count) of columns (n, f count) of which each `count` belong together, over all parts of the rows."""
+    blocks = [X.reshape(len(X), -1, count) for X in parts]
+    return np.asarray(np.sum([np.einsum("nfc,nfd->fcd", each, each) for each in blocks], axis=0))
+
+
 def gains(G: Floats, h: Floats, size: Floats) -> Floats:
-    """Log evidence (f, s) that sets of columns add: G (f, s, d, d), h (f, s, d), prior precision size (s, d)."""
-    M = G + size[None, :, :, None] * np.eye(h.shape[2])
+    """Log evidence (f,) that columns add: G (f, d, d), h (f, d), prior precision size (d,) or (f, d)."""
+    M = G + size[..., None] * np.eye(h.shape[1])
     _, log_det = np.linalg.slogdet(M)
-    fit = np.einsum("fsd,fsd->fs", h, np.linalg.solve(M, h[..., None])[..., 0])
-    return np.asarray(0.5 * fit - 0.5 * log_det + 0.5 * np.log(size).sum(axis=1))
+    fit = np.einsum("fd,fd->f", h, np.linalg.solve(M, h[..., None])[..., 0])
+    return np.asarray(0.5 * fit - 0.5 * log_det + 0.5 * np.log(size).sum(axis=-1))
 
 
-def withheld(gain: Floats) -> Floats:
-    """Log density (s,) gained on withheld parts, from log evidences (f, s), all data first."""
-    return np.asarray((gain[0] - gain[1:]).sum(axis=0))
+def withheld(gain: Floats) -> float:
+    """Log density gained on withheld parts, from log evidences (f,), all data first."""
+    return float((gain[0] - gain[1:]).sum())

@@ -6,17 +6,16 @@ parts, one spot after the other. Without a gain on withheld parts the answer has
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
-from camcomp.diagnosis.law.bench_terms import Spot, TermBench, spots
+from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, spots
+from camcomp.diagnosis.law.find import FoundLaw, fitted
 from camcomp.diagnosis.law.folds import Folds, gains, withheld
+from camcomp.diagnosis.law.forms import SmoothForm
+from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.law.sizes import Sizes
-from camcomp.diagnosis.law.white import White
-from camcomp.ground.datatypes import Floats
-from camcomp.model.law.spline_map import splines, tensor
 
 ALONG, BOTH = 12, 6  # splines over one covariate, and over each of two
 WIDTHS_MM = (0.01, 0.03, 0.1)  # of the coefficients at the tip, standard deviation before any data
@@ -25,86 +24,30 @@ MOST_MAPS = 3
 _SINGLE = ("heading_rad", "temp_C", "cut_min", "fx_N", "fy_N", "fz_N")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class FoundMap:
-    """Maps (spot, covariates, limits, counts) with theta of all their coefficients, and theta_without (f, c) each part; columns:
-    white, with their prior precision (c,).
-    """
-
-    maps: tuple[MapTerm, ...]
-    theta: Floats
-    theta_without: Floats
-    gain: float
-    folds: Folds
-    columns: tuple[White, ...]
-    precision: Floats
-
-
-@dataclass(frozen=True)
-class MapTerm:
-    """One map before its coefficients are known."""
-
-    spot: Spot
-    names: tuple[str, ...]
-    limits: tuple[tuple[float, float], ...]
-    width: float = 0.0
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """How many splines along each covariate."""
-        return (ALONG,) if len(self.names) == 1 else (BOTH, BOTH)
-
-
-def map_values(bench: TermBench, term: MapTerm) -> list[Floats]:
-    """Splines (n, c) per run."""
-    out = []
-    for rows in bench.rows(term.spot):
-        basis = [
-            splines(rows[name], low, high, count)
-            for name, (low, high), count in zip(term.names, term.limits, term.shape, strict=True)
-        ]
-        out.append(tensor(basis))
-    return out
-
-
-def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundMap | None:
+def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundLaw | None:
     """The maps that the residual of a kind of channel follows; None where the gain on withheld parts stays below
     LEAST_GAIN.
     """
-    where, step = spots(len(bench.bench.actuators), kind), folds
-    chosen: list[MapTerm] = []
+    where, shapes, step = spots(len(bench.bench.actuators), kind), Shapes(bench), folds
+    chosen: list[Term] = []
     while len(chosen) < MOST_MAPS:
-        best: tuple[float, MapTerm] | None = None
+        best: tuple[float, Term] | None = None
         for spot in [s for s in where if all(s != each.spot for each in chosen)]:
             size = bench.sizes(spot)
             for names in _covariates(spot, size):
-                term = MapTerm(spot, names, tuple(size.limits[name] for name in names))
-                white = bench.white(spot, map_values(bench, term))
-                data = step.together([white])
+                counts = (ALONG,) if len(names) == 1 else (BOTH, BOTH)
+                form = SmoothForm(about=names, limits=tuple(size.limits[n] for n in names), counts=counts, width=1.0)
+                G, h = step.together([shapes.columns(Term(spot, form))[0]])
                 for width in WIDTHS_MM:
-                    prior = np.full(data.h.shape[1], 1.0 / width**2)
-                    gain = float(withheld(gains(data.G[:, None], data.h[:, None], prior[None]))[0])
+                    gain = withheld(gains(G, h, np.full(form.size, width**-2.0)))
                     if best is None or gain > best[0]:
-                        best = (gain, MapTerm(spot, names, term.limits, width))
+                        best = gain, Term(spot, replace(form, width=width))
         if best is None or best[0] < LEAST_GAIN:
             break
         chosen.append(best[1])
-        step = folds.extended([bench.white(each.spot, map_values(bench, each)) for each in chosen], _precision(chosen))
-    if not chosen:
-        return None
-    columns = tuple(bench.white(each.spot, map_values(bench, each)) for each in chosen)
-    data = folds.together(columns)
-    size_of = _precision(chosen)
-    theta = folds.coefficients(columns, size_of)[0]
-    gain = float(withheld(gains(data.G[:, None], data.h[:, None], size_of[None]))[0])
-    return FoundMap(
-        maps=tuple(chosen), theta=theta[0], theta_without=theta[1:], gain=gain, folds=folds, columns=columns,
-        precision=size_of,
-    )  # fmt: skip
-
-
-def _precision(chosen: Sequence[MapTerm]) -> Floats:
-    return np.concatenate([np.full(int(np.prod(each.shape)), 1.0 / each.width**2) for each in chosen])
+        found = fitted(shapes, chosen, folds)
+        step = folds.extended(found.columns, found.precision)
+    return found if chosen else None
 
 
 def _covariates(spot: Spot, size: Sizes) -> list[tuple[str, ...]]:

@@ -15,9 +15,8 @@ from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.law.answer import rms_um
+from camcomp.diagnosis.law.answer import LawAnswer, rms_um, term_bench
 from camcomp.diagnosis.law.bench_terms import Spot
-from camcomp.diagnosis.law.law_answer import LawAnswer, term_bench
 from camcomp.diagnosis.report.answer import cause_name
 from camcomp.diagnosis.report.law_section import LawView
 from camcomp.diagnosis.report.page import diagnosis_html

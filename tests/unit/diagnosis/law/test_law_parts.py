@@ -6,11 +6,10 @@ from scipy.stats import multivariate_normal
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term
 from camcomp.diagnosis.law.find import margin, unlikely
-from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, gains, usual_split, withheld
+from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, White, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import at_drive, at_tip
 from camcomp.diagnosis.law.library import LearnedLaw, keep, learned
 from camcomp.diagnosis.law.sizes import Sizes
-from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.result.types import Law, LawPart, LawTerm
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.model.law.covariates import AT_DRIVE, AT_TIP, is_load
@@ -40,13 +39,12 @@ def test_the_gain_is_that_of_the_marginal_density():
     X, r, size = rng.normal(size=(12, 2)), rng.normal(size=12), np.array([0.5, 2.0])
     with_law = multivariate_normal(np.zeros(12), np.eye(12) + X @ np.diag(1 / size) @ X.T).logpdf(r)
     without = multivariate_normal(np.zeros(12), np.eye(12)).logpdf(r)
-    got = gains((X.T @ X)[None, None], (X.T @ r)[None, None], size[None])
-    assert got[0, 0] == pytest.approx(with_law - without)
+    got = gains((X.T @ X)[None], (X.T @ r)[None], size)
+    assert got[0] == pytest.approx(with_law - without)
 
 
 def test_what_is_withheld_is_judged_by_what_the_others_say():
-    gain = np.array([[10.0], [6.0], [7.0]])
-    assert withheld(gain) == pytest.approx([(10.0 - 6.0) + (10.0 - 7.0)])
+    assert withheld(np.array([10.0, 6.0, 7.0])) == pytest.approx((10.0 - 6.0) + (10.0 - 7.0))
 
 
 def test_few_runs_are_withheld_in_stretches_and_what_lasts_a_while_in_every_other_one():

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.law.bench_terms import Spot, TermBench
-from camcomp.diagnosis.law.folds import Folds, Split
+from camcomp.diagnosis.law.folds import Folds, Split, White
 from camcomp.diagnosis.law.forms import Form
 from camcomp.diagnosis.law.screen import Screen, TermGrid
-from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 
 TIPS = (Spot("structure", 0), Spot("structure", 1))
@@ -55,15 +54,13 @@ class Runs(TermBench):
 
 def screen(bench, keep, at_once):
     rng = np.random.default_rng(3)
-    ends = np.cumsum([0, *(len(each.texts) for each in FORMS)])
-    grid = TermGrid(
-        bench=bench, spots=TIPS, forms=FORMS, first=ends[:-1], width=int(ends[-1]), at_once=at_once, keep=keep
-    )
+    counts = [tuple(form for form in FORMS if form.size == count) for count in (1, 2)]
+    grids = [TermGrid(bench=bench, spots=TIPS, forms=forms, at_once=at_once, keep=keep) for forms in counts]
     swing = [np.sin(2 * np.pi * (run["x_mm"] + 2.0) / PERIODS[2]) for run in bench.runs]
     residual = [rng.normal(size=400) + np.concatenate([np.zeros(200), each]) for each in swing]
     white = [ByChannel(3, ((np.arange(3), rng.normal(size=(400, 3))),)) for _ in residual]
     folds = Folds(white, residual, np.ones(3), [np.linspace(0, 1, 400)] * 2, Split(1, 1), ())
-    return Screen([grid], folds, np.random.default_rng(0)), folds, grid
+    return Screen(grids, folds, np.random.default_rng(0)), folds, grids[1]
 
 
 def test_in_parts_that_are_not_kept_they_gain_what_they_gain_all_together():
@@ -75,7 +72,7 @@ def test_in_parts_that_are_not_kept_they_gain_what_they_gain_all_together():
         assert [term for _, term in got] == [term for _, term in expected]
         assert [gain for gain, _ in got] == pytest.approx([gain for gain, _ in expected])
         assert chance == pytest.approx(by_chance)
-    assert len(list(kept.parts())) == 1 and len(list(anew.parts())) == 4
+    assert len(list(kept.parts())) == 1 and len(list(anew.parts())) == 3
     assert next(kept.parts())[1][0] is next(kept.parts())[1][0]
     assert next(anew.parts())[1][0] is not next(anew.parts())[1][0]
 
