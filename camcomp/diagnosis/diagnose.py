@@ -25,8 +25,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.answer import LawAnswer, answer_law
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.model.calibration import calibration_of
-from camcomp.diagnosis.next_experiment.after_unknown import explore
-from camcomp.diagnosis.next_experiment.designed import propose
+from camcomp.diagnosis.next_experiment.designed import explore, propose
 from camcomp.diagnosis.next_experiment.outcomes import ONLY_NOISE, with_outcomes
 from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.diagnosis.result.floor_rule import within_floor

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -74,52 +75,45 @@ def candidate(site: Site, design: MotionDesign, varies: tuple[str, ...] = ()) ->
 
 def usual(site: Site) -> MotionDesign:
     """Circle with the position, size and feed of the runs."""
-    if site.cut is not None:
-        return MotionDesign(centre=_triple(site.cut.centre), radius=site.cut.radius, feed=site.cut.feed, cutting=True)
-    return _in_air(site, MotionDesign(centre=_triple(site.work.centre), radius=site.work.radius, feed=site.work.feed))
+    place = site.work if site.cut is None else site.cut
+    cutting = site.cut is not None
+    return _in_air(
+        site, MotionDesign(centre=_triple(place.centre), radius=place.radius, feed=place.feed, cutting=cutting)
+    )
 
 
 def coarse(site: Site, room: Room) -> Iterator[Candidate]:
     """Coarse grid of designs: region of work, distant, large, other planes, straight, slow and fast, later."""
     base = usual(site)
-    here = _in_air(site, replace(base, cutting=False))
     if site.cut is not None:
         yield from (candidate(site, replace(base, feed=times * site.cut.feed)) for times in CUT_FASTER)
         yield candidate(site, replace(base, radius=SMALL * base.radius))
     for times in FASTER:
-        yield candidate(site, replace(here, feed=times * here.feed))
-    middle = np.array(here.centre)
-    ways = _ways()
-    reaches = dict(zip(map(tuple, ways), room.reaches(middle, ways, site.farther, site.low), strict=True))
-    for way, far in reaches.items():
-        for share in OUT if sum(map(bool, way)) == 1 else OUT[-1:]:
+        yield _air(site, base, feed=times * base.feed)
+    middle, ways, reaches = _reaches(site, room, base)
+    for way, far in zip(ways, reaches, strict=True):
+        for share in OUT if np.count_nonzero(way) == 1 else OUT[-1:]:
             if far > 0.0:
-                centre = middle + share * (1.0 - SMALL) * far * np.array(way)
-                yield candidate(site, _in_air(site, replace(here, centre=_triple(centre), radius=SMALL * far)))
-    flat = OUT[-1] * min(reaches[way] for way in reaches if abs(way[0]) + abs(way[1]) == 1.0 and way[2] == 0.0)
+                yield _air(site, base, centre=_triple(middle + share * (1.0 - SMALL) * far * way), radius=SMALL * far)
+    flat = OUT[-1] * min(far for way, far in zip(ways, reaches, strict=True) if abs(way[0]) + abs(way[1]) == 1.0)
+    up = OUT[-1] * float(reaches[np.argmax(ways @ [0.0, 0.0, 1.0])])
     for plane in PLANES:
-        radius = flat if plane == "XY" else min(flat, 0.5 * OUT[-1] * reaches[(0.0, 0.0, 1.0)])
+        radius = flat if plane == "XY" else min(flat, 0.5 * up)
         if radius > 0.0:
-            yield candidate(site, _in_air(site, replace(here, radius=radius, plane=plane)))
-    for way in (
-        (1.0, 0.0, 0.0),
-        (0.0, 1.0, 0.0),
-        (0.0, 0.0, 1.0),
-        (0.5**0.5, 0.5**0.5, 0.0),
-        (0.5**0.5, -(0.5**0.5), 0.0),
-    ):
-        ends = OUT[-1] * room.reaches(middle, np.array([way, [-v for v in way]]), site.farther, site.low)
+            yield _air(site, base, radius=radius, plane=plane)
+    diagonals = np.array([[0.5**0.5, 0.5**0.5, 0.0], [0.5**0.5, -(0.5**0.5), 0.0]])
+    for line in np.concatenate([np.eye(3), diagonals]):
+        ends = OUT[-1] * room.reaches(middle, np.array([line, -line]), site.farther, site.low)
         if (half := 0.5 * float(ends.sum())) > 0.0:
-            centre = middle + 0.5 * float(ends[0] - ends[1]) * np.array(way)
-            yield candidate(site, _in_air(site, replace(here, centre=_triple(centre), radius=half, along=way)))
+            centre = middle + 0.5 * float(ends[0] - ends[1]) * line
+            yield _air(site, base, centre=_triple(centre), radius=half, along=_triple(line))
     yield from in_time(site)
 
 
 def in_time(site: Site) -> Iterator[Candidate]:
     """Experiments about time: standstills, and later repetitions."""
     base = usual(site)
-    still = _in_air(site, replace(base, cutting=False, dwell_s=DWELL_S))
-    yield candidate(site, still, varies=("time", "temperature"))
+    yield _air(site, base, ("time", "temperature"), dwell_s=DWELL_S)
     yield candidate(site, replace(base, wait_s=LATER_S), varies=("time", "temperature"))
 
 
@@ -131,7 +125,7 @@ def by_other_means(site: Site) -> Iterator[Candidate]:
         if channel not in site.channels:
             action = f"{base.action}, and log {name} as well"
             yield replace(base, action=action, channels=(*site.channels, channel), minutes=base.minutes + cost)
-    base = candidate(site, _in_air(site, replace(design, cutting=False)))
+    base = _air(site, design)
     for effect, parameter, what, cost, deviation in _BY_HAND:
         action = f"measure {what} and state what is found under effects: in the config; {base.action}; diagnose again --without {effect}"
         yield replace(base, action=action, minutes=base.minutes + cost, knows=((effect, parameter, deviation),))
@@ -145,16 +139,11 @@ def single_changes(site: Site, room: Room) -> Iterator[Candidate]:
         yield candidate(site, replace(base, feed=4.0 * base.feed), ("velocity", "acceleration"))
     yield candidate(site, replace(base, feed=0.5 * base.feed), ("velocity", "acceleration"))
     if base.cutting:
-        yield candidate(site, _in_air(site, replace(base, cutting=False)), ("force",))
-    here = _in_air(site, replace(base, cutting=False))
-    middle = np.array(here.centre)
-    ways = _ways()
-    reaches = room.reaches(middle, ways, site.farther, site.low)
-    way, far = ways[int(np.argmax(reaches))], float(reaches.max())
-    centre = _triple(middle + (1.0 - SMALL) * far * way)
-    yield candidate(
-        site, _in_air(site, replace(here, centre=centre, radius=min(here.radius, SMALL * far))), ("position",)
-    )
+        yield _air(site, base, ("force",))
+    middle, ways, reaches = _reaches(site, room, base)
+    far = float(reaches.max())
+    centre = _triple(middle + (1.0 - SMALL) * far * ways[int(np.argmax(reaches))])
+    yield _air(site, base, ("position",), centre=centre, radius=min(base.radius, SMALL * far))
     yield from in_time(site)
 
 
@@ -174,10 +163,18 @@ def neighbours(site: Site, design: MotionDesign, step: float) -> Iterator[Motion
             yield replace(design, feed=feed)
 
 
-def _ways() -> Floats:
-    """Unit directions (k, 3) along the axes and to the corners."""
+def _reaches(site: Site, room: Room, base: MotionDesign) -> tuple[Floats, Floats, Floats]:
+    """Centre (3,) of a design in the air, unit directions (k, 3) along the axes and to the corners, and how far (k,) they reach."""
     every = np.array([w for w in product((1.0, 0.0, -1.0), repeat=3) if sum(map(abs, w)) in (1.0, 3.0)])
-    return np.asarray(every / np.linalg.norm(every, axis=1)[:, None], float)
+    ways = every / np.linalg.norm(every, axis=1)[:, None]
+    middle = np.array(_in_air(site, replace(base, cutting=False)).centre)
+    return middle, ways, room.reaches(middle, ways, site.farther, site.low)
+
+
+def _air(site: Site, base: MotionDesign, varies: tuple[str, ...] = (), **changes: Any) -> Candidate:
+    """Experiment of a design in the air with some changes."""
+    here = _in_air(site, replace(base, cutting=False))
+    return candidate(site, _in_air(site, replace(here, **changes)), varies)
 
 
 def _in_air(site: Site, design: MotionDesign) -> MotionDesign:

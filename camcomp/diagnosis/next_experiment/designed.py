@@ -19,10 +19,12 @@ from camcomp.diagnosis.next_experiment.candidates import (
     candidate,
     coarse,
     neighbours,
-)
+    single_changes,
+)  # fmt: skip
 from camcomp.diagnosis.next_experiment.design import MotionDesign
 from camcomp.diagnosis.next_experiment.information_gain import most_narrowed, predicted_gain, program_weight
-from camcomp.diagnosis.next_experiment.predicted_logs import Question, predict_logs
+from camcomp.diagnosis.next_experiment.outcomes import after_unknown
+from camcomp.diagnosis.next_experiment.predicted_logs import Question, feasible, predict_logs
 from camcomp.diagnosis.next_experiment.proposal import WORTH, Proposal
 from camcomp.diagnosis.next_experiment.ready_program import can_be_run
 from camcomp.diagnosis.next_experiment.site import Room, Site, room_of, site_of
@@ -81,11 +83,6 @@ class Desk:
                         best, improved = other, True
         return best
 
-    def can_run(self, each: Candidate) -> bool:
-        """Whether a program can approach it from above."""
-        bench = self.question.problem.bench
-        return can_be_run(each, bench.runs, self.question.job, bench.twin)
-
     def within(self, design: MotionDesign) -> bool:
         """Whether the design is within reach of the machine and within `Site.farther` of the work."""
         points = design.points()
@@ -113,7 +110,8 @@ def propose(problem: Problem, rivals: Sequence[Fitted], probability: Floats, job
     )
     if moving is not None:
         found.append(desk.refined(moving))
-    can = (each for each in sorted(found, key=lambda each: -each.value) if desk.can_run(each.candidate))
+    bench, found = problem.bench, sorted(found, key=lambda each: -each.value)
+    can = (each for each in found if can_be_run(each.candidate, bench.runs, job, bench.twin))
     whole = [desk.judged(each.candidate, whole=True) for each in islice(can, MOST_JUDGED_WHOLE)]
     worth = [each for each in whole if each is not None and each.gain > WORTH]
     return max(worth, key=lambda each: each.value, default=None)
@@ -126,3 +124,28 @@ def ranked(desk: Desk, tried: Iterable[Candidate]) -> list[Proposal]:
     judged = (desk.judged(each) for each in useful if desk.within(each.design))
     found = [each for each in judged if each is not None and each.gain > WORTH]
     return sorted(found, key=lambda each: -each.value)
+
+
+def explore(problem: Problem, labels: Sequence[tuple[str, float]], job: Job) -> Proposal | None:
+    """The experiment with the largest gain about the covariate of an unknown effect, or None.
+
+    A run in which some covariates of the residual change shows whether the true one is among them: its gain is the entropy
+    of that outcome, bits. labels: covariates (`time:x`) with the share of the residual that each explains alone.
+    """
+    weight: dict[str, float] = {}
+    for name, share in labels:
+        family = name.partition(":")[0]
+        weight[family] = max(weight.get(family, 0.0), share)
+    whole = sum(weight.values())
+    found = []
+    bench = problem.bench
+    for each in single_changes(site_of(bench), room_of(bench, job)):
+        p = sum(weight.get(family, 0.0) for family in each.varies) / whole if whole > 0 else 0.0
+        gain = -float(sum(q * np.log2(q) for q in (p, 1.0 - p) if q > 0.0))
+        if gain > WORTH:
+            others = [family for family in sorted(weight, key=lambda of: -weight[of]) if family not in each.varies]
+            outcomes = after_unknown([v for v in each.varies if v in weight] or each.varies, others)
+            found.append(Proposal(candidate=each, gain=gain, separates=("unknown",), outcomes=outcomes))
+    found.sort(key=lambda each: -each.value)
+    can = (each for each in found if can_be_run(each.candidate, bench.runs, job, bench.twin))
+    return next((each for each in can if feasible(problem, each.candidate, job)), None)
