@@ -11,9 +11,7 @@ from camcomp.ground.datatypes import Bools, Floats, Path
 _NEAR_MM = 0.5  # of the circle: set-points that far off are on another path
 _WHOLE = np.radians(350.0)  # a program that turns so far drives a circle
 _WIDEST_DEG = 15.0  # between rows of a circle that counts as measured
-_FEWEST_ROWS = 48
-_ANGLES = np.radians(np.arange(360) + 0.5)
-OUTWARD = np.column_stack((np.cos(_ANGLES), np.sin(_ANGLES)))  # (360, 2) at every degree
+OUTWARD = np.column_stack([of(np.radians(np.arange(360) + 0.5)) for of in (np.cos, np.sin)])  # (360, 2) at every degree
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +102,7 @@ def _turn(circle: Circle, counter_clockwise: bool, commanded: Floats, known: Boo
     near &= known & np.isfinite(angle)
     at = np.degrees(angle) % 360.0
     seen = np.sort(at[near])
-    if len(seen) < _FEWEST_ROWS or np.diff(seen, append=seen[0] + 360.0).max() > _WIDEST_DEG:
+    if not len(seen) or np.diff(seen, append=seen[0] + 360.0).max() > _WIDEST_DEG:
         return None
     return Turn(circle, counter_clockwise, near, at)
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from camcomp.diagnosis.law.words import listed
+from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.report.plot import brief
 
 MAX_SENTENCES = 3  # rival sets with a sentence of their own
-MAX_INDISTINGUISHABLE_CHI2 = 4.0  # two standard deviations: rivals below it look the same in one log
 ONLY_NOISE = "nothing but noise"  # the name of an empty set of causes
 _WHAT = {
     "tip": ("the tip is", 1e3, "µm"),
@@ -58,7 +58,7 @@ def _by_log(proposal: Proposal, names: Sequence[str], i: int) -> str:
     what, scale, unit = _WHAT[found.kind]
     off = f"If it is {names[i]}, {what} off by {brief(scale * float(found.shows[i]), 2)} {unit} (rms) on it"
     others = [j for j in range(len(names)) if j != i]
-    if alike := [names[j] for j in others if found.apart[i, j] < MAX_INDISTINGUISHABLE_CHI2]:
+    if alike := [names[j] for j in others if found.apart[i, j] < INDISTINGUISHABLE]:
         return f"{off}; {listed(alike[:MAX_SENTENCES])} would look the same there."
     left, nearest = min((float(found.left[i, j]), j) for j in others)
     return f"{off}, of which {names[nearest]} cannot explain {brief(scale * left, 2)} {unit}."

@@ -31,7 +31,6 @@ from camcomp.model.motion.timeline import schedule
 
 ROWS = 2500  # of a predicted log
 WARMS_K = 5.0  # largest further drift of a temperature
-UPRIGHT = 0.9  # of a direction along Z, beyond which another axis defines the lateral directions
 USUAL_NOISE = (0.002, 0.0005, 1.0, 2.0)  # mm, mm, N, N: default for unmeasured tip, encoders, drives, dynamometer
 
 
@@ -235,8 +234,7 @@ def _across(tips: Floats) -> Floats:
     moving = np.linalg.norm(step, axis=1) > 0.0
     last = np.maximum.accumulate(np.where(moving, np.arange(len(tips)), int(np.argmax(moving))))
     along = step[last] / np.maximum(np.linalg.norm(step[last], axis=1, keepdims=True), 1e-12)
-    other = np.where(np.abs(along[:, 2:3]) < UPRIGHT, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    side = np.cross(along, other)
+    side = np.cross(along, np.eye(3)[np.argmin(np.abs(along), axis=1)])
     side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
     return np.stack([along, side, np.cross(along, side)], axis=1)
 

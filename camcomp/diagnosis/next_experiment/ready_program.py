@@ -22,7 +22,6 @@ from camcomp.model.motion.twin import Twin
 CLEAR_MM = (10.0, 5.0, 2.0)  # clearances above all motions, to try in this order
 SAMPLES = 65  # points of a motion at which the travel is checked
 CUTS = "WARNING: THIS PROGRAM CUTS, as the runs with cutting did: clamp stock and check the depth"
-_METRIC = 710  # G71, the G21 of some controllers
 
 
 def ready_program(candidate: Candidate, runs: Sequence[Run], job: Job, twin: Twin, dialect: str = DEFAULT) -> str:
@@ -76,7 +75,7 @@ def spelt(program: str, dialect: str) -> str:
         words = line.split()
         if words[0] == "G4":  # in seconds: X of some, where P counts milliseconds
             words[1] = f"{'X' if 'X' in language.dwell else language.dwell[0]}{float(words[1][1:]):.1f}"
-        if words[0] == "G21" and _METRIC in language.more:
+        if words[0] == "G21" and 710 in language.more:  # G71, the G21 of some controllers
             words[0] = "G71"
         if language.increments:
             words = [f"{word}." if word[0] in "FIJK" and "." not in word else word for word in words]

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.diagnosis.circles import OUTWARD, Turn, turns_of
-from camcomp.diagnosis.report.run_view import RunView
+from camcomp.diagnosis.report.run_view import MOST_DRAWN, RunView
 from camcomp.diagnosis.report.words import cell
 from camcomp.diagnosis.result.standards import CircularTest
 from camcomp.ground.datatypes import Floats
 from camcomp.report.page import Section, Table
 from camcomp.report.plot import INK, Figure, Json, axis, brief, line, numbers
 
-MOST_CIRCLES = 4
 _TIP = ("tip x", "tip y", "tip z")
 _ISO = (
     "G is the circular deviation of one direction, G(b) that of both, each about its own least-squares centre; F max and "
@@ -53,7 +52,7 @@ def circles_section(views: Sequence[RunView], tests: Sequence[CircularTest]) -> 
     if not groups and not tests:
         return None
     order = sorted(groups, key=lambda key: -max(float(np.nanmax(np.abs(gap.before))) for gap in groups[key]))
-    figures = [_figure(groups[key], i) for i, key in enumerate(order[:MOST_CIRCLES], 1)]
+    figures = [_figure(groups[key], i) for i, key in enumerate(order[:MOST_DRAWN], 1)]
     rank = {key: i for i, key in enumerate(order)}
     shown = sorted(tests, key=lambda test: rank.get((test.circle, test.cutting), len(order)))
     return Section(

@@ -10,19 +10,28 @@ from camcomp.diagnosis.report.answer import cause_name
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView, likeness, rms, spectrum
 from camcomp.diagnosis.report.words import percent
 from camcomp.diagnosis.result.types import FoundCause, UnseenShrinkage, Where
-from camcomp.report.plot import BAR_MARGIN, INK, SCALE, STYLES, Figure, Json, axis, brief, level, line, numbers, thin
-
-MAP_POINTS = 4000
+from camcomp.report.plot import (
+    BAR_MARGIN,
+    INK,
+    MOST_POINTS,
+    SCALE,
+    STYLES,
+    Figure,
+    Json,
+    axis,
+    brief,
+    level,
+    line,
+    numbers,
+    thin,
+)
 
 
 def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
     """The gap on withheld runs with one cause after the other added to the model; floor: noise floor, um, or None."""
     names = ["as it was", *(f"+ {cause_name(step)}" for step in shrink.steps)]
     values = [shrink.before_rms_um, *(step.after_rms_um for step in shrink.steps)]
-    bars = {
-        "type": "bar", "orientation": "h", "x": values[::-1], "y": names[::-1], "showlegend": False, "cliponaxis": False,
-        "marker": {"color": STYLES[0][0]}, "text": [f"{brief(v)} µm" for v in values[::-1]], "textposition": "outside",
-    }  # fmt: skip
+    bars = _bars(values[::-1], names[::-1], [f"{brief(v)} µm" for v in values[::-1]])
     style = {"color": STYLES[1][0], "dash": "dot", "width": 2}
     noise: Json = {
         "type": "scatter", "mode": "lines", "x": [floor, floor], "y": [names[-1], names[0]], "name": "noise floor",
@@ -44,6 +53,14 @@ def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
         },
         height=150 + 42 * len(names),
     )
+
+
+def _bars(values: Sequence[float], names: Sequence[str], texts: Sequence[str]) -> Json:
+    """Horizontal bars with a text behind each."""
+    return {
+        "type": "bar", "orientation": "h", "x": list(values), "y": list(names), "text": list(texts), "textposition": "outside",
+        "marker": {"color": STYLES[0][0]}, "cliponaxis": False, "showlegend": False,
+    }  # fmt: skip
 
 
 def figure_signed(view: RunView, number: int) -> Figure:
@@ -99,7 +116,7 @@ def figure_map(views: Sequence[RunView]) -> Figure:
     before, after = (np.concatenate([view.sizes[i] for view in views]) for i in range(2))
     known = np.isfinite(position).all(axis=1) & np.isfinite(before)
     position, before, after = position[known], before[known], after[known]
-    step = max(len(position) // MAP_POINTS, 1)
+    step = max(len(position) // MOST_POINTS, 1)
     position, before, after = position[::step], before[::step], after[::step]
     spans = np.ptp(position, axis=0)
     h, v = sorted(np.argsort(-spans, kind="stable")[:2])
@@ -143,11 +160,9 @@ def figure_shares(where: Where) -> Figure | None:
     rows = [(f"{kind} {name}", share) for kind, part in groups for name, share in part.items()][::-1]
     if not any(share for _, share in rows):
         return None
-    bars = {
-        "type": "bar", "orientation": "h", "x": [100.0 * share for _, share in rows], "y": [name for name, _ in rows],
-        "marker": {"color": STYLES[0][0]}, "text": [percent(share) for _, share in rows], "textposition": "outside",
-        "cliponaxis": False, "showlegend": False,
-    }  # fmt: skip
+    bars = _bars(
+        [100.0 * share for _, share in rows], [name for name, _ in rows], [percent(share) for _, share in rows]
+    )
     words = ", ".join(f"{name} {100 * share:.0f} %" for name, share in rows[::-1] if share)
     return Figure(
         name="shares",
@@ -188,15 +203,12 @@ def figure_causes(causes: Sequence[FoundCause]) -> Figure:
     """Probability of every cause and its share of the gap."""
     shown = causes[::-1]
     names = [cause_name(each) for each in shown]
-    bars = []
     sizes = {"share of the gap": [c.share for c in shown], "probability": [c.probability for c in shown]}
+    bars = []
     for i, (label, size) in enumerate(sizes.items()):
-        values = [100.0 * each for each in size]
-        bars.append({
-            "type": "bar", "orientation": "h", "name": label, "x": values, "y": names, "cliponaxis": False,
-            "marker": {"color": STYLES[2 * (1 - i)][0], "pattern": {"shape": "" if i else "/"}},
-            "text": [percent(each) for each in size], "textposition": "outside",
-        })  # fmt: skip
+        marker = {"color": STYLES[2 * (1 - i)][0], "pattern": {"shape": "" if i else "/"}}
+        bar = _bars([100.0 * each for each in size], names, [percent(each) for each in size])
+        bars.append(bar | {"name": label, "marker": marker, "showlegend": True})
     words = ", ".join(f"{cause_name(c)} {100 * c.probability:.0f} %" for c in causes)
     return Figure(
         name="causes-plot",

@@ -13,8 +13,6 @@ from camcomp.ground.datatypes import Floats
 from camcomp.report.page import Section, Table
 from camcomp.report.plot import STYLES, Figure, Json, axis, brief, numbers, thin
 
-POINTS = 1500
-
 
 @dataclass(frozen=True, eq=False)
 class LawView:
@@ -54,7 +52,7 @@ def _figure(law: Law, view: LawView) -> Figure:
     x, left, said = (np.concatenate([run[k] for run in view.runs]) for k in (1, 2, 3))
     known = np.isfinite(left)
     x, left, said = x[known], left[known], said[known]
-    index = thin(np.column_stack((left, said)), POINTS)
+    index = thin(np.column_stack((left, said)))
     traces: list[Json] = [
         _dots("left without the law", x[index], left[index], STYLES[0][0], 4),
         _dots("the law, fitted to the other runs", x[index], said[index], STYLES[1][0], 5),

@@ -22,7 +22,7 @@ from camcomp.diagnosis.report.figures import (
 )
 from camcomp.diagnosis.report.joints import joints_section
 from camcomp.diagnosis.report.law_section import LawView, law_section
-from camcomp.diagnosis.report.run_view import RivalSignals, RunView, rms
+from camcomp.diagnosis.report.run_view import MOST_DRAWN, RivalSignals, RunView, rms
 from camcomp.diagnosis.report.standards import standards_section
 from camcomp.diagnosis.report.words import cell, percent, plain, remedy, sizes
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, NextExperiment, UnseenShrinkage, Where
@@ -30,7 +30,6 @@ from camcomp.report.inputs import Input, inputs_section
 from camcomp.report.page import Listing, Page, Section, Table, render
 from camcomp.report.plot import brief, micrometres
 
-MOST_RUNS = 4
 Row = list[str | tuple[float, str]]  # of a table: text, or a number to sort by and its text
 INDISTINGUISHABLE_TEXT = (
     "Each of these sets explains the logs as well as the others. They stay together because, in the runs that were made, "
@@ -85,7 +84,7 @@ def diagnosis_html(
     if (joints := joints_section(result, residuals)) is not None:
         sections.append(joints)
     sections += _gap_of_runs(seen, floor)
-    sections.append(_where(result.where, seen[:MOST_RUNS]))
+    sections.append(_where(result.where, seen[:MOST_DRAWN]))
     if (standards := standards_section(result.standards)) is not None:
         sections.append(standards)
     if inputs:
@@ -107,7 +106,7 @@ def _gap_of_runs(views: Sequence[RunView], floor: float | None) -> list[Section]
     """Sections of the gap along time, path and workpiece; views: runs, the one with the largest gap first."""
     if not views:
         return []
-    shown = views[:MOST_RUNS]
+    shown = views[:MOST_DRAWN]
     left_out = len(views) - len(shown)
     text = [f"The {len(shown)} runs with the largest gap; {left_out} more are not drawn."] if left_out else []
     along_time = [figure_signed(v, i) for i, v in enumerate(shown, 1)]

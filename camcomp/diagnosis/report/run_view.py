@@ -8,6 +8,8 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats, Path
 
+MOST_DRAWN = 4  # runs, or circles, with figures of their own
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunView:
