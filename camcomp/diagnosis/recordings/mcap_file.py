@@ -61,7 +61,7 @@ def read_mcap(data: bytes, name: str) -> list[SampledColumns]:
             stamps, logged = np.array(times[topic]).T
             time = stamps if np.isfinite(stamps).all() else logged
             units = [SI if in_si[topic] else ""] * len(names)
-            out.append(of_values(name, names, units, list(table.T), time, notes))
+            out.append(of_values(name, names, units, list(table.T), time=time, notes=notes))
             notes = []
     if not out:
         raise ConfigError("CC452", "the file has no messages with numbers", at=Location(name, 1, 1))

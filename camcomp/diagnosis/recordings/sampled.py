@@ -33,7 +33,8 @@ class SampledColumns:
 
 
 def of_values(
-    file: str, names: Sequence[str], units: Sequence[str], values: Sequence[Floats], time: Floats | None, notes: Sequence[str]
+    file: str, names: Sequence[str], units: Sequence[str], values: Sequence[Floats], *, time: Floats | None,
+    notes: Sequence[str],
 ) -> SampledColumns:  # fmt: skip
     """Columns of values (n,) that a container holds as numbers: their cells have no location of their own."""
     return SampledColumns(

@@ -41,7 +41,7 @@ def read_tdms(data: bytes, name: str) -> list[SampledColumns]:
     for (_, rows, step, start), channels in together.items():
         time = None if step is None else np.asarray(start + step * np.arange(rows), float)
         labels, units, columns = zip(*channels, strict=True)
-        out.append(of_values(name, labels, units, columns, time, notes))
+        out.append(of_values(name, labels, units, columns, time=time, notes=notes))
         notes = []
     return out
 
