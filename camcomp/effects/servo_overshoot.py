@@ -4,13 +4,15 @@ Its natural frequency is 1000 / period_ms Hz. A plain second-order loop, which i
 and a servo_lag of that time; with high damping servo_lag alone.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion, Parameter
-from camcomp.model.hysteresis import second_order
+from camcomp.model.hysteresis import first_order, second_order
+from camcomp.model.seams import Seams
 
 STAGE = "control"
 TARGET = "either"
@@ -33,6 +35,44 @@ FITTED = (
     Parameter("by_acceleration_ms2", "ms2", 0.0, 0.0, 9000.0, 40.0, 0.1, _LOOPS, sign=1),
     _DAMPING,
 )
+
+
+_PERIODS_S = tuple(np.geomspace(0.004, 0.25, 16))  # of loops that are tried first
+_LEAST_LAG_S = 1e-5  # of a loop that is not late
+_DAMPINGS = (0.1, 0.25, 0.5, 0.8, 1.5)
+GUESSED_FROM = len(_PERIODS_S) * len(_DAMPINGS)
+
+
+def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[str, float]:
+    """Loop of logs of one axis by least squares, jointly with a constant and a first-order lag; empty where the axis rests or no
+    loop of a feed drive is like it.
+
+    runs: time (n,) s, set-points (n,), encoders (n,).
+    """
+    runs = [run for run in runs if len(run[0]) > 4 and np.ptp(run[1]) > 0.0]
+    if not runs:
+        return {}
+    gap = np.concatenate([x - y for _, x, y in runs])
+    beside = np.concatenate([np.stack([np.ones(len(t)), np.gradient(x, t)], axis=1) for t, x, _ in runs])
+    Q = np.linalg.qr(beside)[0]
+    lagged = max(float(np.linalg.lstsq(beside, gap, rcond=None)[0][1]), _LEAST_LAG_S)
+
+    begun = [Seams(np.zeros(1, int), np.full(1, np.inf), np.diff(x[:2])[:, None] / (t[1] - t[0])) for t, x, _ in runs]
+
+    def left(at: Floats) -> Floats:
+        period, damping, lag = np.exp(at).tolist()
+        swung = [x[:, None] + second_order(x[:, None], t, period, damping) for t, x, _ in runs]
+        late = [first_order(each, t, lag, seams) for each, (t, _, _), seams in zip(swung, runs, begun, strict=True)]
+        swings = np.concatenate([x - each[:, 0] for (_, x, _), each in zip(runs, late, strict=True)])
+        rest = gap - swings
+        return np.asarray(rest - Q @ (Q.T @ rest))
+
+    grid = [np.log([period, damping, lagged]) for period in _PERIODS_S for damping in _DAMPINGS]
+    first = min(grid, key=lambda at: float(np.sum(left(at) ** 2)))
+    widest = np.log([(0.5 * _PERIODS_S[0], 0.01, 0.1 * _LEAST_LAG_S), (1.0, 10.0, 1.0)])
+    period, damping, _ = np.exp(least_squares(left, first, bounds=widest, diff_step=1e-3, max_nfev=20).x).tolist()
+    found = {"by_acceleration_ms2": (1e3 * period / (2.0 * np.pi)) ** 2, "damping": damping}
+    return found if all(p.low < found[p.name] < p.high for p in FITTED) else {}
 
 
 def public(fitted: Mapping[str, float]) -> dict[str, float]:

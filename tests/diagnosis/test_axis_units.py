@@ -66,7 +66,7 @@ def test_what_is_on_top_of_a_machine_file_changes_its_entry(tmp_path):
     done = diagnose(experiment(tmp_path, lagging(tmp_path, 0.008)))
     assert [c.effect for c in done.result.causes] == ["servo_lag"]
     tree = YAML(typ="safe").load(done.machine_with_causes(str(tmp_path / "new.yaml")))
-    (entry,) = tree["effects"]
+    (entry,) = (each for each in tree["effects"] if each["effect"] == "servo_lag")
     assert entry["time_constant_ms"]["value"] == pytest.approx(8.0, rel=0.01)
 
 

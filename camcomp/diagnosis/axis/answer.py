@@ -9,10 +9,12 @@ import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import TipMotion, held_errors, lever_mm, position_floor, whole_errors
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
+from camcomp.diagnosis.axis.gate import KNOWN
 from camcomp.diagnosis.result.types import (
     ActuatorGap,
     ActuatorShrinkage,
     Driver,
+    Estimate,
     FoundCause,
     GapSize,
     IntervalShare,
@@ -27,6 +29,7 @@ from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance
 from camcomp.ground.datatypes import Floats
 from camcomp.model.motion.log_columns import log_columns
 
+SAME_TIME_CONSTANT = 0.02  # of a time constant: by which those of axes may differ and be one
 STRETCHES_OF_ONE = 4  # that a run holds, at least; it differs from the next one by as much as means of these
 
 
@@ -198,3 +201,38 @@ def _interval(judged: Sequence[Sequence[AxisChannel]], runs: Sequence[tuple[floa
 
 def _mean_square(channels: Sequence[AxisChannel], part: str) -> float:
     return float(np.mean(np.concatenate([getattr(c, part) for c in channels])))
+
+
+def share_lag(found: Sequence[AxisFindings]) -> None:
+    """One lag where one common value serves for all axes that move (contract, section 5)."""
+    moving = [
+        a for a in found if a.following is not None and any(float(np.ptp(m.position)) > 0 for m in a.following.moves)
+    ]
+    lags = [(a, c) for a in moving for c in a.causes if c.effect == "servo_lag"]
+    if len(lags) < 2 or len(lags) < len(moving):
+        return
+    each = [c.parameters["time_constant_ms"] for _, c in lags]
+    value, half = np.array([e.value for e in each]), np.array([0.5 * (e.ci95[1] - e.ci95[0]) for e in each])
+    weight = 1.0 / np.maximum(half, 1e-12) ** 2
+    common = float(weight @ value / weight.sum())
+    if np.any(np.abs(value - common) > np.maximum(half, SAME_TIME_CONSTANT * abs(common))):
+        return
+    together = FoundCause(
+        effect="servo_lag",
+        target=None,
+        probability=min(c.probability for _, c in lags),
+        share=float(sum(c.share for _, c in lags)),
+        parameters={
+            "time_constant_ms": _with_spread(
+                common, max(KNOWN * abs(common), float(weight.sum() ** -0.5), float(np.std(value)))
+            )
+        },
+    )
+    for a, c in lags:
+        a.causes.remove(c)
+    lags[0][0].causes.append(together)
+
+
+def _with_spread(value: float, spread: float) -> Estimate:
+    low, high = (float(f"{value + sign * spread:.6g}") for sign in (-1.0, 1.0))
+    return Estimate(value=float(f"{value:.6g}"), ci95=(low, high))

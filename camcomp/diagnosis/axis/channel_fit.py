@@ -9,14 +9,14 @@ Source: Swevers, Verdonck, De Schutter, IEEE Control Systems 27 (2007) 58; shrin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.axis.channels import KNOWN
+from camcomp.diagnosis.axis.channel_data import HEALTHY_SHARE, ChannelData, Sizes
 from camcomp.diagnosis.axis.effect_columns import AxisCause
-from camcomp.diagnosis.axis.gate import MINOR
+from camcomp.diagnosis.axis.gate import KNOWN, MINOR
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
 from camcomp.diagnosis.model.discrepancy import covariate_columns, gains_of_more, smooth_functions
@@ -31,33 +31,15 @@ STEP = 1e-3  # of an amplitude in scales, for slopes
 PASSES = 3  # in which columns are made linear again where the fit stands
 MOST_CHANGE = 0.7  # of the logarithm of a shape in one step
 CAUSES = 3  # of one channel of one axis
-HEALTHY_SHARE = 0.3  # of the channel's size: scale of a size that every axis has
 SHAPE_SD = 1.5  # of the logarithm of a shape: scans of shapes span four
-Sizes = Mapping[str, Floats]  # kind -> columns (n, q)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ChannelData:
-    """Rows of one channel, per run: values (n,), columns of healthy sizes, covariates (n,) of the dictionary.
-
-    response: what causes with their amplitudes (d,) add to the channel of run k (n,). floor: noise of the channel. train: runs that are fitted.
-    level: constant without a meaning.
-    """
-
-    values: Sequence[Floats]
-    healthy: Sequence[Sizes]
-    covariates: Sequence[Mapping[str, Floats]]
-    response: Callable[[int, Sequence[tuple[AxisCause, Floats]]], Floats]
-    floor: float
-    train: Sequence[int]
-    level: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChannelFit:
     """What the model says of a channel: causes, healthy sizes by kind with their covariance, and residuals per run.
 
-    acting: the causes with their amplitudes. drivers: covariate of the dictionary that is more likely than not -> share of the residual's energy.
+    acting: the causes with their amplitudes. columns (n, k): of these and the healthy sizes, of the fitted runs. drivers: covariate of the dictionary that is more likely than not ->
+    share of the residual's energy. hints: the same, where nothing but such functions makes rows of the residual alike.
     """
 
     causes: tuple[FoundCause, ...]
@@ -65,7 +47,9 @@ class ChannelFit:
     sizes: Mapping[str, Floats]
     covariance: Floats
     left: Sequence[Floats]
+    columns: Floats
     drivers: Mapping[str, float]
+    hints: Mapping[str, float]
 
     def combined(self, weights: Mapping[str, Sequence[float]]) -> Estimate:
         """A sum of healthy sizes, by kind, with its 95 % interval."""
@@ -95,10 +79,62 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
         amount = _amounts(linear, terms)
         moved = [amount[i] if i in members else np.zeros(len(t.parameters)) for i, t in enumerate(terms)]
         same = all(np.allclose(a, b, rtol=1e-3, atol=1e-6) for a, b in zip(at, moved, strict=True))
-        if not members or same or again == PASSES:
+        late = data.clock > 0.0 and again == 0  # rows may be late without any cause, too
+        if again == PASSES or (not late and (same or not members)):
             break
-        terms, at = _shaped(data, terms, members, moved)
+        left, _, sizes = _left(data, terms, linear)
+        data = data.refined(left, sizes)
+        terms, at = _shaped(data, terms, members, moved, sd)
+    terms, linear = _without_needless(data, terms, linear, sd)
     return _answer(data, terms, linear, sd)
+
+
+def _without_needless(
+    data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: float
+) -> tuple[Sequence[AxisCause], _Linear]:
+    """The fit without causes that the others, or a function of one covariate, explain as well.
+
+    Sets are made linear where they stand. A cause goes, too, where it is as large as on every healthy machine.
+    """
+
+    def misfit(fit: _Linear, own: Sequence[AxisCause]) -> float:
+        left = _left(data, own, fit, small=False)[0]
+        return float(np.mean(data.in_floors(dict(enumerate(left))) ** 2))
+
+    while linear.found.members:
+        own = [terms[i] for i in linear.found.members]
+        amount = _amounts(linear, terms)
+        at = [amount[i] for i in linear.found.members]
+        every = tuple(range(len(own)))
+        sets = [every, *(tuple(i for i in every if i != out) for out in every)]
+        fits = {on: _settled(data, own, at, on=on, sd=sd) for on in sets}
+        value = {on: _beside_functions(fit) for on, fit in fits.items()}
+        best = max(sets[1:], key=lambda on: value[on])
+        more = misfit(fits[best], own) - misfit(fits[every], own)
+        if value[best] < value[every] and more > (MINOR * data.floor) ** 2:
+            break
+        terms, linear = own, fits[best]
+    return terms, linear
+
+
+def _beside_functions(linear: _Linear) -> float:
+    """Log evidence of the set of a fit, jointly with the function of one covariate that goes best with it, or with none."""
+    found = linear.found
+    return found.log_evidence + max(0.0, *gains_of_more(linear.model, found.background, found.members).values())
+
+
+def _settled(
+    data: ChannelData, terms: Sequence[AxisCause], at: Sequence[Floats], *, on: tuple[int, ...], sd: float
+) -> _Linear:
+    """The fit of one set of causes, made linear where it stands."""
+    at = [each if i in on else np.zeros(len(each)) for i, each in enumerate(at)]
+    for again in range(PASSES):
+        responses = [_columns(data, terms, k, at) for k in range(len(data.values))]
+        linear = _explained(data, terms, responses, sd, on)
+        amount = _amounts(linear, terms)
+        if again < PASSES - 1:
+            at = [amount[i] if i in on else each for i, each in enumerate(at)]
+    return linear
 
 
 def healthy_sizes(columns: Sequence[Sizes], values: Sequence[Floats], floor: float) -> tuple[dict[str, Floats], Floats]:
@@ -112,7 +148,7 @@ def healthy_sizes(columns: Sequence[Sizes], values: Sequence[Floats], floor: flo
     scale = np.where(rms > 0.0, rms, 1.0)  # columns of zeros keep their prior
     X = X / scale
     left = y - X @ np.linalg.lstsq(X, y, rcond=1e-9)[0]
-    sd = max(float(np.sqrt(np.mean(left**2) * rows_together(left))), floor)
+    sd = _noise_of(left, floor)
     prior = max(HEALTHY_SHARE * float(np.sqrt(np.mean(y**2))), 1e-6 * sd)
     inverse = np.linalg.inv(X.T @ X / sd**2 + np.eye(X.shape[1]) / prior**2)
     mean = inverse @ (X.T @ y) / sd**2 / scale
@@ -138,20 +174,19 @@ def _columns(data: ChannelData, terms: Sequence[AxisCause], k: int, at: Sequence
 
 
 def _shaped(
-    data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats]
+    data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats], sd: float
 ) -> tuple[list[AxisCause], list[Floats]]:
     """Terms and amplitudes with the shapes of the causes that act by one Gauss-Newton step; as they are where it does not help."""
     names = [(i, name) for i in members for name in terms[i].scanned if terms[i].shape[name] > 0.0]
     terms, at = [*terms], [*at]
     if not names:
         return terms, at
-    base = _misfit(data, terms, members, at)
+    base = _misfit(data, terms, members, at, sd)
     acting = [i for i in members]
-    columns = [np.concatenate([*own.values()], axis=1) for own in data.healthy]
-    slopes = []
+    slopes, values = {}, {}
     for k in data.train:
         here = data.response(k, [(terms[i], at[i]) for i in acting])
-        own = [columns[k]]
+        own = [data.healthy_columns(k)]
         for i in acting:
             for d in np.diag(STEP * np.maximum(np.abs(at[i]), 1.0)):
                 more = data.response(k, [(terms[j], at[j] + d if j == i else at[j]) for j in acting])
@@ -160,10 +195,9 @@ def _shaped(
             longer = replace(terms[i], shape={**terms[i].shape, name: terms[i].shape[name] * (1.0 + STEP)})
             more = data.response(k, [(longer if j == i else terms[j], at[j]) for j in acting])
             own.append((more - here)[:, None] / STEP)
-        slopes.append((np.concatenate(own, axis=1), data.values[k] - here))
-    J, y = (np.concatenate([each[part] for each in slopes]) for part in (0, 1))
-    size = np.sqrt(np.mean(J**2, axis=0)) + 1e-300
-    c = (np.linalg.lstsq(J / size, y, rcond=1e-9)[0] / size)[columns[0].shape[1] :]
+        slopes[k], values[k] = np.concatenate(own, axis=1), data.values[k] - here
+    prior = np.concatenate([*data.scales.values()])
+    c = _shrunk(data.in_floors(slopes), data.in_floors(values), prior, sd)[len(prior) :]
     for share in (1.0, 0.3, 0.1):
         moved, by, place = [*at], [*terms], 0
         for i in acting:
@@ -171,18 +205,30 @@ def _shaped(
         for (i, name), change in zip(names, c[place:], strict=True):
             factor = float(np.exp(np.clip(share * change, -MOST_CHANGE, MOST_CHANGE)))
             by[i] = replace(by[i], shape={**by[i].shape, name: terms[i].bounded(name, by[i].shape[name] * factor)})
-        if _misfit(data, by, members, moved) < base:
+        if _misfit(data, by, members, moved, sd) < base:
             return by, moved
     return terms, at
 
 
-def _misfit(data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats]) -> float:
-    """Sum of squares that causes and healthy sizes leave of the fitted runs."""
-    A = np.concatenate([np.concatenate([*data.healthy[k].values()], axis=1) for k in data.train])
+def _misfit(
+    data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats], sd: float
+) -> float:
+    """Sum of squares, prior included, that causes and healthy sizes leave of the fitted runs."""
     acting = [(terms[i], at[i]) for i in members]
-    y = np.concatenate([data.values[k] - data.response(k, acting) for k in data.train])
+    A = data.in_floors({k: data.healthy_columns(k) for k in data.train})
+    y = data.in_floors({k: data.values[k] - data.response(k, acting) for k in data.train})
+    prior = np.concatenate([*data.scales.values()])
+    c = _shrunk(A, y, prior, sd)
+    return float(np.sum((y - A @ c) ** 2) + sd**2 * np.sum((c / np.maximum(prior, 1e-300)) ** 2))
+
+
+def _shrunk(A: Floats, y: Floats, prior: Floats, sd: float) -> Floats:
+    """Amplitudes (k,) of columns (n, k) by least squares, the first of them under a prior of standard deviations (q,)."""
     size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
-    return float(np.sum((y - A / size @ np.linalg.lstsq(A / size, y, rcond=1e-9)[0]) ** 2))
+    shrinks = np.zeros(A.shape[1])
+    shrinks[: len(prior)] = sd / np.maximum(prior, 1e-300)
+    rows = np.concatenate([A / size, np.diag(shrinks / size)])
+    return np.asarray(np.linalg.lstsq(rows, np.concatenate([y, np.zeros(A.shape[1])]), rcond=1e-9)[0] / size)
 
 
 def _noise(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> float:
@@ -190,21 +236,24 @@ def _noise(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> flo
 
     Rows that are correlated count for less: the variance is that of a row times the rows that count as one.
     """
-    healthy = [np.concatenate([*own.values()], axis=1) for own in data.healthy]
-    A = np.concatenate([np.concatenate([responses[k][0], healthy[k]], axis=1) for k in data.train])
-    y = np.concatenate([data.values[k] - responses[k][1] for k in data.train])
+    A = data.in_floors({k: np.hstack((responses[k][0], data.healthy_columns(k))) for k in data.train})
+    y = data.in_floors({k: data.values[k] - responses[k][1] for k in data.train})
     size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
     left = y - A / size @ np.linalg.lstsq(A / size, y, rcond=1e-9)[0]
-    return max(float(np.sqrt(np.mean(left**2) * rows_together(left))), data.floor)
+    return _noise_of(left, data.floor)
+
+
+def _noise_of(left: Floats, floor: float) -> float:
+    """Standard deviation of a row of residuals (n,) that counts as one of its own."""
+    return max(float(np.sqrt(np.mean(left**2) * rows_together(left))), floor)
 
 
 def _explained(
     data: ChannelData, terms: Sequence[AxisCause], responses: Sequence[tuple[Floats, Floats]],
-    sd: float,
+    sd: float, on: tuple[int, ...] | None = None,
 ) -> _Linear:  # fmt: skip
-    kinds = {kind: np.concatenate([data.healthy[k][kind] for k in data.train]) for kind in data.healthy[0]}
-    unit = {kind: _shares(sd, np.sqrt(np.mean(own**2, axis=0))) for kind, own in kinds.items()}
-    ends = _ends(data)
+    """The posterior over sets of causes made linear; on: this set alone."""
+    unit, ends = data.scales, _ends(data)
     groups = []
     for k in data.train:
         A, offset = responses[k]
@@ -218,7 +267,7 @@ def _explained(
         groups.append(
             Group(
                 name=str(k), label="axis", y=y, A=A[:, None], N=np.zeros((n, 1, 0)),
-                sd=np.full((n, 1), sd), B={**white, **smooth},
+                sd=sd * (data.noise[k] if data.noise else np.ones(n))[:, None], B={**white, **smooth},
             )
         )  # fmt: skip
     start, placed = 0, []
@@ -228,20 +277,15 @@ def _explained(
     bounds = AmplitudeBounds.of(
         [p for t in terms for p in t.parameters], [bool(t.shape) for t in terms for _ in t.parameters]
     )
-    size = float(np.sqrt(np.mean(np.concatenate([data.values[k] for k in data.train]) ** 2)))
     model = LinearModel(
         groups=tuple(groups),
         candidates=tuple(placed),
         bounds=bounds,
-        healthy=dict.fromkeys(kinds, max(HEALTHY_SHARE * size / sd, 1e-6)),
+        healthy=dict.fromkeys(unit, 1.0),
     )
-    values = search_sets(model.reduced(Background()), CAUSES).values
+    data_of = model.reduced(Background())
+    values = search_sets(data_of, CAUSES).values if on is None else {on: max(data_of.value(on), -1e300)}
     return _Linear(model, posterior_of(model, {Background(): values}), unit)
-
-
-def _shares(sd: float, size: Floats) -> Floats:
-    """Ratio of sd to the size of every column (k,); 0 for a column that is 0, as of an axis that stands still."""
-    return np.divide(sd, size, out=np.zeros_like(size), where=size > 0.0)
 
 
 def _ends(data: ChannelData) -> dict[str, tuple[float, float]]:
@@ -262,21 +306,33 @@ def _amounts(linear: _Linear, terms: Sequence[AxisCause]) -> list[Floats]:
     return out
 
 
-def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: float) -> ChannelFit:
+def _left(
+    data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, *, small: bool = True
+) -> tuple[list[Floats], list[Floats], dict[str, Floats]]:
+    """Residuals (n,) per run, amplitudes of all terms, and healthy sizes by kind.
+
+    small: whether causes that do not act have the small errors of a healthy machine.
+    """
     found, model = linear.found, linear.model
-    amount = _amounts(linear, terms)
-    covariance = found.amplitudes()[1]
-    at = model.posterior(found.background, found.data.slab(found.members))
-    slots = {kind: np.arange(model.layout.size)[model.layout.covariates[kind]] for kind in linear.unit}
-    sizes = {kind: unit * at.mean[slots[kind]] for kind, unit in linear.unit.items()}
-    every, units = np.concatenate([*slots.values()]), np.concatenate([*linear.unit.values()])
-    among = at.covariance(every.tolist()) * np.outer(units, units)
+    mean = model.posterior(found.background, found.data.slab(found.members)).mean
+    sizes = {kind: unit * mean[model.layout.covariates[kind]] for kind, unit in linear.unit.items()}
+    errors = [small * mean[list(c.columns)] for c in model.candidates]
+    amount = [a if i in found.members else errors[i] for i, a in enumerate(_amounts(linear, terms))]
     left = []
-    small = [at.mean[list(c.columns)] for c in model.candidates]
-    amount = [a if i in found.members else small[i] for i, a in enumerate(amount)]
     for k, y in enumerate(data.values):
         part = data.response(k, [(t, a) for t, a in zip(terms, amount, strict=True) if a.any()])
         left.append(y - part - sum((data.healthy[k][kind] @ sizes[kind] for kind in sizes), np.zeros(len(y))))
+    return left, amount, sizes
+
+
+def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: float) -> ChannelFit:
+    found, model = linear.found, linear.model
+    covariance = found.amplitudes()[1]
+    at = model.posterior(found.background, found.data.slab(found.members))
+    slots = {kind: np.arange(model.layout.size)[model.layout.covariates[kind]] for kind in linear.unit}
+    every, units = np.concatenate([*slots.values()]), np.concatenate([*linear.unit.values()])
+    among = at.covariance(every.tolist()) * np.outer(units, units)
+    left, amount, sizes = _left(data, terms, linear)
     spreads = _spreads_of_shapes(data, terms, linear, amount)
     scale = calibration_of("axes")
     causes, acting = [], []
@@ -298,12 +354,38 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
                 parameters=_parameters(term, amount[i], half, spreads.get(i, {})),
             )
         )  # fmt: skip
-    gains = gains_of_more(model, found.background, found.members)
-    names = {b.scales[-1][0] for b, gain in gains.items() if b.scales and gain > 0.0}
-    drivers = {name: _share_of(linear, name, [left[k] for k in data.train], sd) for name in names}
+    train = [left[k] for k in data.train]
+    drivers, hints = ({n: _share_of(linear, n, train, sd) for n in own} for own in _named(data, linear, left, sd))
     return ChannelFit(
-        causes=tuple(causes), acting=tuple(acting), sizes=sizes, covariance=among, left=left, drivers=drivers
-    )
+        causes=tuple(causes), acting=tuple(acting), sizes=sizes, covariance=among, left=left, drivers=drivers,
+        hints=hints, columns=_design(linear),
+    )  # fmt: skip
+
+
+def _design(linear: _Linear) -> Floats:
+    """Columns (n, k) of the causes that act and of healthy sizes, in all rows that were fitted."""
+    model = linear.model
+    slots = [j for kind in linear.unit for j in range(*model.layout.covariates[kind].indices(model.layout.size))]
+    on = [*(j for i in linear.found.members for j in model.candidates[i].columns), *slots]
+    return np.concatenate([model.layout.design(g)[:, 0, on] for g in model.groups])
+
+
+def _named(data: ChannelData, linear: _Linear, left: Sequence[Floats], sd: float) -> tuple[set[str], set[str]]:
+    """Covariates whose function of the residual (n,) is more likely than not, and the same where the noise is what these
+    functions leave.
+    """
+    found, model, ends = linear.found, linear.model, _ends(data)
+    functions = {
+        k: np.hstack([np.zeros((len(left[k]), 0)), *(smooth_functions(data.covariates[k][n], *ends[n]) for n in ends)])
+        for k in data.train
+    }
+    y, B = data.in_floors(dict(enumerate(left))), data.in_floors(functions)
+    rest = _noise_of(y - B @ np.linalg.lstsq(B, y, rcond=1e-9)[0], data.floor)
+    out = []
+    for factor in (1.0, min(rest / sd, 1.0)):
+        gains = gains_of_more(model, replace(found.background, noise=factor), found.members)
+        out.append({b.scales[-1][0] for b, gain in gains.items() if b.scales and gain > 0.0})
+    return out[0], out[1]
 
 
 def _share_of(linear: _Linear, name: str, left: Sequence[Floats], sd: float) -> float:
@@ -322,6 +404,12 @@ def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[
         low, value, high = (p.value(each * p.scale) for each in (a - h, a, a + h))
         if p.name in values:
             out[p.name] = _estimate(value, low, high)
+    if hasattr(term.module, "public"):
+        ends = [term.cause(np.maximum(amount + sign * half, 0.0).tolist()).values for sign in (-1.0, 0.0, 1.0)]
+        for name in term.module.public({p.name: p.nominal for p in term.module.FITTED}):
+            if name not in term.shape:
+                low, value, high = (each[name] for each in ends)
+                out[name] = _estimate(value, low, high)
     for name in [each for each in term.shape if each in values and each not in term.switches]:
         value = term.shape[name]
         if name in term.known:
@@ -342,6 +430,7 @@ def _spreads_of_shapes(
     if not names:
         return {}
     acting = {i: (terms[i], amount[i]) for i in members}
+    settings = [(i, each) for i in members for each in terms[i].other_settings]
     slopes = []
     for k in data.train:
         own = []
@@ -352,14 +441,19 @@ def _spreads_of_shapes(
             ]
             ends = [data.response(k, [*{**acting, i: (each, amount[i])}.values()]) for each in both]
             own.append((ends[0] - ends[1]) / (2.0 * STEP))
+        for i, each in settings:
+            ends = [data.response(k, [*{**acting, i: (term, amount[i])}.values()]) for term in (each, terms[i])]
+            own.append(ends[0] - ends[1])
         slopes.append(np.stack(own, axis=1))
     columns = [j for i in members for j in model.candidates[i].columns]
     healthy = [j for kind in linear.unit for j in range(*model.layout.covariates[kind].indices(model.layout.size))]
     designs = [model.layout.design(g)[:, 0, [*columns, *healthy]] for g in model.groups]
-    J = np.concatenate([np.hstack(pair) for pair in zip(slopes, designs, strict=True)]) / model.groups[0].sd[0, 0]
+    rows = zip(slopes, designs, model.groups, strict=True)
+    J = np.concatenate([np.hstack((own, design)) / g.sd for own, design, g in rows])
     prior = np.zeros(J.shape[1])
     prior[: len(names)] = SHAPE_SD**-2
-    prior[len(names) + len(columns) :] = 1.0 / next(iter(model.healthy.values())) ** 2
+    prior[len(names) : len(names) + len(settings)] = 1.0  # springs are known to a factor of two
+    prior[-len(healthy) :] = 1.0
     size = np.sqrt(np.sum(J**2, axis=0) + prior) + 1e-300
     inverse = np.linalg.pinv((J / size).T @ (J / size) + np.diag(prior / size**2), rcond=1e-9)
     out: dict[int, dict[str, float]] = {}

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
@@ -30,8 +31,8 @@ from camcomp.model.statics.masses import MassLoads
 
 ChannelName = Literal["following", "behind", "force"]
 STAGE_OF: Mapping[ChannelName, str] = {"following": "control", "behind": "drive", "force": "drive"}
-# of loops: found by a search of their own; of standing poses; of an interval that is searched; laws; a zero of an encoder
-ELSEWHERE = ("servo_overshoot", "joint_hysteresis", "joint_curve", "disturbance", "formula", "map", "joint_offset")
+# of standing poses; of an interval that is searched; laws; a zero of an encoder
+ELSEWHERE = ("joint_hysteresis", "joint_curve", "disturbance", "formula", "map", "joint_offset")
 
 DRAG = {
     hinge: tuple(p for p in shelf.load("effects", "friction").PARAMETERS if p.name in names)
@@ -76,6 +77,15 @@ class AxisCause:
         return {p.name for p in getattr(self.module, "FITTED", ()) if p.either}
 
     @property
+    def other_settings(self) -> list[AxisCause]:
+        """The same cause with another setting of a switch."""
+        fitted = {p.name: p.either for p in getattr(self.module, "FITTED", ()) if p.name in self.shape}
+        return [
+            replace(self, shape={**self.shape, name: value})
+            for name, values in fitted.items() for value in values if value != self.shape[name]
+        ]  # fmt: skip
+
+    @property
     def place(self) -> tuple[str, str]:
         """Effect and target; intervals of one target are several places."""
         return self.effect, self.target if self.run is None else f"{self.target} {self.run} {self.shape}"
@@ -89,11 +99,12 @@ class AxisCause:
         return Cause(self.effect, self.module, self.target, {**nominal, **(public(values) if public else values)})
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class DrivenAxis:
     """One run of one axis as the signal path sees it: mm or rad; lever: the study's mm per unit of the axis.
 
-    weight, inertia (n,): load of the stated masses on the drive, N or N mm; 0 where none are stated.
+    weight, inertia (n,): load of the stated masses on the drive, N or N mm; 0 where none are stated. way (n,): of the axis,
+    where it is known better than by its encoder, in the study's mm.
     """
 
     run: AxisRun
@@ -101,6 +112,7 @@ class DrivenAxis:
     lever: float
     weight: Floats
     inertia: Floats
+    way: Floats | None = None
 
     @cached_property
     def asked(self) -> Motion:
@@ -110,8 +122,10 @@ class DrivenAxis:
 
     @cached_property
     def moved(self) -> Motion:
-        """The motion of the encoders; a play behind them gives way to the weight of stated masses."""
-        plain = self._motion(self.run.time, self.run.encoder / self.lever)
+        """The motion of the encoders, or the one that was determined from them; a play behind them gives way to the weight of
+        stated masses.
+        """
+        plain = self._motion(self.run.time, (self.run.encoder if self.way is None else self.way) / self.lever)
         return replace(plain, held=lambda: self.weight[:, None]) if self.weight.any() else plain
 
     def channel(self, name: ChannelName, causes: Sequence[Cause]) -> Floats:
@@ -182,7 +196,7 @@ def candidates(
                 AxisCause(
                     effect=name, module=module, target=actuator.name, parameters=fitted,
                     shape={key: value for key, value in shape.items() if key not in names},
-                    ways=float(len(shapes) * len(fits)),
+                    ways=float(len(shapes) * len(fits) * getattr(module, "GUESSED_FROM", 1)),
                     steps=tuple(shape[p.name] / p.scale if p.name in shape else 1.0 for p in fitted),
                 )
             )  # fmt: skip
@@ -221,23 +235,24 @@ def _shapes(
     module: Any, own: Sequence[Parameter], axes: Sequence[DrivenAxis], channel: ChannelName
 ) -> list[dict[str, float]]:
     """Shapes to try: of a guess from the rows, or the values of a scan."""
-    fixed = {p.name: p.either[0] for p in own if p.either}
+    switches = {p.name: p.either for p in own if p.either}
+    settings = [dict(zip(switches, values, strict=True)) for values in product(*switches.values())]
     if channel == "following" and hasattr(module, "guess"):
         runs = [
             (a.asked.time, a.asked.encoder[:, 0], np.interp(a.asked.time, a.run.time, a.run.encoder / a.lever))
             for a in axes
         ]
         guess = module.guess(runs, axes[0].actuator.revolute)
-        return [{**fixed, **guess}] if guess else []
+        return [{**each, **guess} for each in settings] if guess else []
     scanned = [p for p in own if p.scan]
     if any(p.placed or p.turns for p in scanned):
         return []
     if not scanned:
-        return [fixed]
+        return settings
     if len(scanned) != 1:
         return []
     ends = [a.moved.common[[0, -1]] for a in axes]
     longest = (
         np.ptp(np.concatenate(ends)) if scanned[0].unit in ("s", "min") else np.inf
     )  # a longer curve is a straight line
-    return [{**fixed, scanned[0].name: value} for value in scanned[0].scan if value <= longest]
+    return [{**each, scanned[0].name: value} for each in settings for value in scanned[0].scan if value <= longest]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
-from camcomp.diagnosis.axis.block_least_squares import Gain, Series
+from camcomp.diagnosis.axis.block_least_squares import Series
 from camcomp.diagnosis.axis.gate import AxisGate
 from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, spikes
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
@@ -50,7 +49,6 @@ class AxisRun:
     course: tuple[Floats, Floats] | None = None
     expected: Floats | None = None
     load: Floats | None = None
-    _finely: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def gap(self) -> Floats:
@@ -66,14 +64,6 @@ class AxisRun:
     def asked(self) -> tuple[Floats, Floats]:
         """Times and set-points (m,) of the whole log."""
         return self.course or (self.time, self.setpoint)
-
-    def asked_finely(self, per: int) -> tuple[Floats, Floats]:
-        """Times and set-points (k,) of the whole log with `per` steps between two rows, over which set-points go on smoothly."""
-        if per not in self._finely:
-            seen, asked = self.asked
-            time = np.interp(np.arange((len(seen) - 1) * per + 1) / per, np.arange(len(seen)), seen)
-            self._finely[per] = time, asked if per == 1 else CubicSpline(seen, asked)(time)
-        return self._finely[per]
 
     def without_spikes(self) -> tuple[AxisRun, np.ndarray]:
         """The run with neighbours in the place of rows that are no measurement, and these rows' numbers."""
@@ -178,9 +168,7 @@ class AxisChannel:
     first: Floats  # mean squares of withheld blocks without causes
     last: Floats
     columns: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (n, k) of what was fitted
-    beside: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (n, k) of all that may be there beside a push
     moves: list[AxisTravel] = field(default_factory=list)
-    steps: list[tuple[str, float]] = field(default_factory=list)  # effect, rms after
     left: list[Floats] = field(default_factory=list)  # per run
     held: dict[int, Floats] = field(default_factory=dict)  # the same of runs that were never fitted, by their number
     held_whole: dict[int, Floats] = field(
@@ -196,14 +184,10 @@ class AxisChannel:
     names: list[str] = field(default_factory=list)  # of the runs that the gate has seen
     gate: AxisGate | None = None
 
-
-@dataclass(frozen=True, eq=False)
-class Carried:
-    """Position noise per run (mm), and how differentiation and loop lag (s, of set-points) propagate it."""
-
-    noise: list[float]
-    wide: int
-    late: float | None = None
+    @property
+    def residual(self) -> Series:
+        """Residuals of the fitted rows; `columns` are tangents of what was fitted to them."""
+        return replace(self.data, y=np.concatenate(self.left))
 
 
 @dataclass(eq=False, kw_only=True)
@@ -214,14 +198,11 @@ class AxisFindings:
     stated: AxisDeviation
     revolute: bool = False
     wide: int = WIDE[0]
-    carried: Carried = field(default_factory=lambda: Carried([], WIDE[0]))
     causes: list[FoundCause] = field(default_factory=list)
     following: AxisChannel | None = None
     force: AxisChannel | None = None
     behind: AxisChannel | None = None
-    led: Callable[[AxisRun], Floats] | None = None  # what a loop that swings over makes of set-points, mm
     pushed: list[tuple[str, float, float]] = field(default_factory=list)  # for a while: run, and from and to when, s
-    one_way: Gain | None = None  # of a lag that differs between the ways by more than loops are known to
     ripple: Ripple | None = None
     unknown_in: list[tuple[str, float]] = field(default_factory=list)  # covariate kind, share
     unknown_chance: float = 0.0  # log10, the least of all that is unknown

@@ -25,6 +25,8 @@ FALSE = 0.01  # of the stretches that are named
 LEAST_STRETCHES = 8  # of which one can stand out
 JOINED = 0.1  # of a stretch between two that are one
 LEAST_ROWS = 20  # of a stretch
+WITHIN = 0.5  # rows: force and motion of one row are not known to be of one instant to better than that
+KNOWN = 0.01  # of the constants of a loop, and of friction: no law of them is better than that
 
 
 @dataclass(frozen=True)
@@ -141,3 +143,14 @@ def _going_on(left: Floats) -> float:
 def _count(time: Floats) -> int:
     length = float(time[-1] - time[0])
     return int(min(length / STRETCH_S, len(time) / LEAST_ROWS))
+
+
+def not_known(own: Floats) -> Floats:
+    """What a force (n,) N by inertia and friction is not known to, row by row: its size, and when within a row."""
+    return np.asarray(np.hypot(KNOWN * own, within_a_row(own)))
+
+
+def within_a_row(own: Floats) -> Floats:
+    """What values (n,) are not known to, row by row, where the instant of a row is not; at a peak of one row, too."""
+    steps = np.abs(np.diff(own))
+    return np.asarray(WITHIN * np.maximum(np.append(steps, 0.0), np.insert(steps, 0, 0.0)))

@@ -17,26 +17,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.block_least_squares import by_block
-from camcomp.diagnosis.axis.channel_fit import ChannelData, ChannelFit, fit_channel, healthy_sizes
-from camcomp.diagnosis.axis.channels import not_known, series_of
-from camcomp.diagnosis.axis.drive_force import MOST_PUSHES
+from camcomp.diagnosis.axis.block_least_squares import by_block, gain, log10_chance, series, withheld
+from camcomp.diagnosis.axis.channel_data import TURNING, ChannelData
+from camcomp.diagnosis.axis.channel_fit import ChannelFit, fit_channel, healthy_sizes
+from camcomp.diagnosis.axis.disturbance_window import Window, find_window, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
-from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisFindings, AxisRun
-from camcomp.diagnosis.axis.gate import judge
-from camcomp.diagnosis.axis.push import Window, find_window, seen_elsewhere, sharp
-from camcomp.diagnosis.axis.terms import AxisTravel, travel
+from camcomp.diagnosis.axis.findings import FAR, FIRST_MOVE_MM, ROWS, AxisChannel, AxisFindings, AxisRun
+from camcomp.diagnosis.axis.gate import MINOR, WITHIN, judge, not_known
+from camcomp.diagnosis.axis.terms import AxisTravel, ripple, travel
 from camcomp.diagnosis.law.words import law_sum
 from camcomp.diagnosis.result.types import LawPart
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
+from camcomp.model.hysteresis import PRESLIDING_MM
 from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.description import Actuator, Robot, Transform
 from camcomp.model.statics.hanging import hang
 from camcomp.model.statics.masses import has_moved_mass, mass_loads
 from camcomp.model.statics.rotation import rotations_of
 
+TURNS_MM = (1e-4, 0.003, 0.02, 0.1)  # ways over which the friction of a slide turns round in its following error
+TURNS_MM_PER_S = (0.3, 1.5, 5.0)  # speeds with which it may turn round instead
 CREEP = 0.02  # of the fastest row: speed at which Coulomb friction has turned round
+MOST_PUSHES = 2  # of an axis: what comes more often is no mishap
+LEAST_RIPPLE = 0.02  # share of the residual's energy
 LEAST_ARM = 1e-3  # of a direction, or of an arm of 1 m: by which a weight has to change with the pose
 
 
@@ -52,18 +56,17 @@ class AxisSurroundings:
 
     def driven(self, name: str, run: AxisRun) -> DrivenAxis:
         """One run of an axis with the loads of the stated masses on its drive."""
-        lever, none = lever_mm(run.revolute), np.zeros(len(run.time))
+        none = np.zeros(len(run.time))
+        free = Actuator(name=name, revolute=run.revolute, axis=np.array([0.0, 0.0, 1.0]), stiffness=None)
         actuator = next((a for a in self.robot.actuators if a.name == name), None) if self.robot is not None else None
+        bare = DrivenAxis(run=run, actuator=actuator or free, lever=lever_mm(run.revolute), weight=none, inertia=none)
         if self.robot is None or actuator is None:
-            return DrivenAxis(
-                run, Actuator(name=name, revolute=run.revolute, axis=np.array([0.0, 0.0, 1.0]), stiffness=None),
-                lever, none, none,
-            )  # fmt: skip
+            return bare
         if arm_of(self.robot) is None or not has_moved_mass(self.robot, name):
-            return DrivenAxis(run, actuator, lever, none, none)
+            return bare
         j, q = self._index(name), self.positions(run)
         inertia = mass_loads(self.robot, q, run.time).drive[:, j]
-        return DrivenAxis(run, actuator, lever, hang(self.robot, q).drive[:, j], inertia)
+        return replace(bare, weight=hang(self.robot, q).drive[:, j], inertia=inertia)
 
     def positions(self, run: AxisRun) -> Floats:
         """Coordinates (n, m) of all actuators at the rows of a run, mm or rad; an axis that is not logged stands at its start."""
@@ -122,7 +125,10 @@ class AxisSurroundings:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointRows:
-    """Rows of one channel of an axis: runs as logged, how the axis moved in the rows that count, and their values."""
+    """Rows of one channel of an axis: runs as logged, how the axis moved in the rows that count, and their values.
+
+    asymmetric: whether friction in its drive force differs between the directions, which deflects its loop.
+    """
 
     channel: ChannelName
     runs: Sequence[AxisRun]
@@ -132,6 +138,7 @@ class JointRows:
     test: list[int]
     floor: float
     stated: bool
+    asymmetric: bool = False
 
 
 def study_channel(
@@ -139,9 +146,11 @@ def study_channel(
 ) -> tuple[AxisFindings, AxisChannel]:
     """What was found on an axis, with one more channel and its causes."""
     found = replace(found, causes=[*found.causes], unknown_in=[*found.unknown_in], details={**found.details})
-    axes = [around.driven(found.name, run) for run in rows.runs]
-    terms = candidates(around.robot, [axes[k] for k in rows.train], rows.channel, sorted(without))
     seen = [np.isin(run.time, m.time) for run, m in zip(rows.runs, rows.moves, strict=True)]
+    axes = [around.driven(found.name, run) for run in rows.runs]
+    if rows.channel == "force":
+        axes = [replace(a, way=_way(a.run, m, on)) for a, m, on in zip(axes, rows.moves, seen, strict=True)]
+    terms = candidates(around.robot, [axes[k] for k in rows.train], rows.channel, sorted(without))
 
     def response(k: int, acting: Sequence[tuple[AxisCause, Floats]]) -> Floats:
         causes = [term.cause(own.tolist()) for term, own in acting if term.run in (None, rows.runs[k].name)]
@@ -151,7 +160,8 @@ def study_channel(
 
     data = ChannelData(
         values=rows.values, healthy=_healthy(found, rows, around, seen, axes), covariates=_covariates(found, rows, around),
-        response=response, floor=rows.floor, train=rows.train,
+        response=response, floor=rows.floor, train=rows.train, times=[m.time for m in rows.moves],
+        clock=WITHIN * _step(rows.moves) if rows.channel == "force" else 0.0,
         level=0.0 if following else float(np.mean(np.concatenate([rows.values[k] for k in rows.train]))),
     )  # fmt: skip
     done = fit_channel(data, terms)
@@ -162,7 +172,11 @@ def study_channel(
         done = _behind_causes(data, done, columns)
         found.laws = [_written_law(found, texts, done.sizes)]
     if rows.channel == "force" and "disturbance" not in without:
-        done = _with_pushes(found.name, data, terms, done, rows)
+        done, pushes = _with_pushes(found.name, data, terms, done, rows)
+        start = {run.name: run.started for run in rows.runs}
+        found.pushed = [
+            (str(p.run), p.shape["from_s"] - start[str(p.run)], p.shape["to_s"] - start[str(p.run)]) for p in pushes
+        ]
     found.causes += done.causes
     if (
         rows.channel == "behind"
@@ -171,10 +185,21 @@ def study_channel(
         rows = replace(rows, values=[each - own for each, own in zip(rows.values, apart, strict=True)])
     channel = _channel(rows, done)
     _tell(found, rows, done, data.healthy)
+    if rows.channel == "force" and not rows.runs[0].revolute:
+        line = ripple([rows.moves[k] for k in rows.train], [done.left[k] for k in rows.train])
+        if line is not None and line.share > LEAST_RIPPLE and line.amplitude**2 / 2.0 > (MINOR * rows.floor) ** 2:
+            found.ripple = line
+            waves = [wave(2.0 * np.pi * _positions(rows) / line.period) for wave in (np.sin, np.cos)]
+            before, after = (
+                withheld(channel.residual, np.column_stack([channel.columns, *more])) for more in ([], waves)
+            )
+            found.unknown_chance = min(found.unknown_chance, log10_chance(gain(before, after), line.tried))
+    if channel.gate is not None and channel.gate.word == "open" and done.drivers:
+        channel.gate = replace(channel.gate, word="above")  # the size does not tell, a covariate does
     if channel.gate is not None:
         found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
         if channel.gate.word == "above":
-            found.unknown_in += sorted(done.drivers.items(), key=lambda each: -each[1])
+            found.unknown_in += sorted((done.drivers or done.hints).items(), key=lambda each: -each[1])
     return found, channel
 
 
@@ -187,8 +212,11 @@ def _following_laws(rows: JointRows) -> dict[str, tuple[str, ...]]:
     fastest = max((float(np.abs(rows.moves[k].speed).max(initial=0.0)) for k in rows.train), default=0.0)
     place, creep = "followed_rad" if hinge else "followed_mm", max(CREEP * fastest / lever_mm(hinge), 1e-12)
     out = {"acceleration": (f"{place}_per_s2",), "speed": (f"{place}_per_s",), "offset": ("1",)}
-    out["friction"] = (f"tanh({place}_per_s/{creep:.6g})",)
-    return out | ({"weight": (f"sin({place})", f"cos({place})")} if hinge else {})
+    if rows.asymmetric:
+        out["asymmetry"] = (f"abs({place}_per_s)",)
+    if not hinge:
+        return out | {"friction": tuple(f"way({place}, {each:g})" for each in TURNS_MM)}
+    return out | {"friction": (f"tanh({place}_per_s/{creep:.6g})",), "weight": (f"sin({place})", f"cos({place})")}
 
 
 def _all(texts: Mapping[str, Sequence[str]]) -> list[str]:
@@ -216,6 +244,25 @@ def _written_law(found: AxisFindings, texts: Mapping[str, Sequence[str]], sizes:
     return LawPart(effect="formula", stage="control", target=found.name, axis=None, envelope={}, formula=formula)
 
 
+def _positions(rows: JointRows) -> Floats:
+    """Positions (n,) of the fitted runs."""
+    return np.concatenate([rows.moves[k].position for k in rows.train])
+
+
+def _step(moves: Sequence[AxisTravel]) -> float:
+    """Usual time between two rows, s."""
+    return float(np.median(np.concatenate([np.diff(m.time) for m in moves])))
+
+
+def _way(run: AxisRun, moved: AxisTravel, seen: np.ndarray) -> Floats:
+    """Positions (n,) of a run by its motion; between the rows of that as a straight line."""
+    way, first = np.interp(run.time, moved.time, moved.position), int(np.argmax(seen))
+    before = moved.before[max(len(moved.before) - first, 0) :]
+    way[: first - len(before)] = before[0] if len(before) else way[0]
+    way[first - len(before) : first] = before
+    return np.asarray(way)
+
+
 def _healthy(
     found: AxisFindings,
     rows: JointRows,
@@ -227,12 +274,13 @@ def _healthy(
     fastest = max((float(np.abs(rows.moves[k].speed).max(initial=0.0)) for k in rows.train), default=0.0)
     out = []
     for k, m in enumerate(rows.moves):
-        one, angle = np.ones((len(m.time), 1)), m.position / lever_mm(True)
+        one, hinge = np.ones((len(m.time), 1)), rows.runs[k].revolute
         turns = np.tanh(m.speed / max(CREEP * fastest, 1e-12))[:, None]
+        angle = m.position / lever_mm(True)
         weight = np.stack([np.sin(angle), np.cos(angle)], axis=1)
         own = {"offset": one}
         if rows.channel == "behind":
-            if rows.runs[k].revolute:
+            if hinge:
                 own["eccentricity"] = weight
             force = rows.runs[k].force[seen[k]]
             own["delay"] = m.speed[:, None]
@@ -240,9 +288,15 @@ def _healthy(
                 own["compliance"] = force[:, None]
         else:
             own["acceleration"] = m.acceleration[:, None]
-        if rows.channel == "following":
+        if rows.channel == "following" and hinge:
             own |= {"friction": turns, "weight": weight}
-        if rows.channel == "force":
+        elif rows.channel == "following":
+            own["friction"] = np.stack([m.reversal(way) for way in TURNS_MM], axis=1)
+        if rows.asymmetric:
+            own["asymmetry"] = np.abs(m.speed)[:, None]
+        if rows.channel == "force" and not hinge:
+            own[TURNING] = _turning(m)
+        if rows.channel == "force" and hinge:
             own["weight"] = around.weights(found.name, rows.runs[k])[seen[k]]
             stated = axes[k].weight[seen[k]], axes[k].inertia[seen[k]]
             if np.ptp(stated[0]) > 0.0 or np.ptp(stated[1]) > 0.0:
@@ -251,6 +305,11 @@ def _healthy(
     common = set.intersection(*(set(each) for each in out))
     widths = {kind: min(each[kind].shape[1] for each in out) for kind in common}
     return [{kind: own[kind][:, : widths[kind]] for kind in own if kind in common} for own in out]
+
+
+def _turning(m: AxisTravel) -> Floats:
+    """Friction that turns round with the speed, minus the one that does over a distance, (n, q)."""
+    return np.stack([np.tanh(m.speed / each) for each in TURNS_MM_PER_S], axis=1) - m.reversal(PRESLIDING_MM)[:, None]
 
 
 def _covariates(found: AxisFindings, rows: JointRows, around: AxisSurroundings) -> list[dict[str, Floats]]:
@@ -269,7 +328,7 @@ def _covariates(found: AxisFindings, rows: JointRows, around: AxisSurroundings) 
 
 def _with_pushes(
     name: str, data: ChannelData, terms: Sequence[AxisCause], done: ChannelFit, rows: JointRows
-) -> ChannelFit:
+) -> tuple[ChannelFit, list[AxisCause]]:
     """The same fit beside forces that act for a while, where their windows are clear and the evidence takes them."""
     pushes: list[AxisCause] = []
     for _ in range(MOST_PUSHES):
@@ -286,7 +345,7 @@ def _with_pushes(
         if sum(c.effect == "disturbance" for c in again.causes) < len(more):
             break
         done, pushes = again, more
-    return done
+    return done, pushes
 
 
 def _push(name: str, window: Window, rows: JointRows) -> AxisCause:
@@ -294,7 +353,7 @@ def _push(name: str, window: Window, rows: JointRows) -> AxisCause:
     run, time = rows.runs[window.run], rows.moves[window.run].time
     module = shelf.load("effects", "disturbance")
     own = next(p for p in module.PARAMETERS if p.name == ("force_Nmm" if run.revolute else "force_N"))
-    step = float(np.median(np.diff(time)))
+    step = _step([rows.moves[window.run]])
     shape, known = {}, {}
     for key, row in (("from_s", window.first), ("to_s", window.last)):
         at = min(row, len(time) - 1)
@@ -320,6 +379,11 @@ def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, healthy: Seque
             key = "compliance_rad_per_Nmm" if rows.runs[0].revolute else "compliance_mm_per_N"
             found.details["second_encoder"][key] = done.combined({"compliance": [lever**-2]})
         return
+    if not rows.runs[0].revolute:
+        found.details["force"] = {
+            "mass_kg": done.combined({"acceleration": [1e3]}), "constant_N": done.combined({"offset": [1.0]})
+        }  # fmt: skip
+        return
     parts = {kind: np.concatenate([healthy[k][kind] for k in rows.train]) for kind in healthy[0]}
     weight, inertia = parts["weight"] @ done.sizes["weight"], {"acceleration": [lever**2]}
     if "stated masses" in parts:
@@ -338,17 +402,17 @@ def _channel(rows: JointRows, done: ChannelFit) -> AxisChannel:
     """Residuals of the fitted runs, and of those that are judged only, against the floor."""
     moves, values, train, test = rows.moves, rows.values, rows.train, rows.test
     constant = done.sizes["offset"][0] if rows.channel == "force" else 0.0
-    data = series_of(moves, values, train)
+    moving = sum(float(np.ptp(moves[k].position)) > FAR * FIRST_MOVE_MM for k in train)
+    data = series([moves[k].time for k in train], [values[k] for k in train], moving)
     first = by_block(data, data.y - constant)
     channel = AxisChannel(data=data, runs=train, first=first, last=first, floor=rows.floor, stated=rows.stated)
     channel.all_names = [run.name for run in rows.runs]
     channel.moves, channel.left = [moves[k] for k in train], [done.left[k] for k in train]
     channel.last = by_block(data, np.concatenate(channel.left))
-    fitted = data.y - np.concatenate(channel.left)
-    channel.columns = np.stack([fitted, np.ones_like(fitted)], axis=1)
+    channel.columns = done.columns
     channel.whole = [(moves[k].time, values[k]) for k in train]
     if test:
-        seen = series_of(moves, values, test)
+        seen = series([moves[k].time for k in test], [values[k] for k in test])
         channel.first = by_block(seen, seen.y - constant)
         channel.last = by_block(seen, np.concatenate([done.left[k] for k in test]))
     channel.held = {k: done.left[k] for k in test}

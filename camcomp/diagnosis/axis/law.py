@@ -19,7 +19,7 @@ from camcomp.diagnosis.axis.block_least_squares import (
     Series,
     fit,
     gain,
-    leftover,
+    held_out_residuals,
     log10_chance,
     solve,
     withheld,
@@ -59,12 +59,12 @@ class _Rows:
         return np.nan_to_num(np.stack(found, axis=1)) if found else np.zeros((n, 0))
 
     def withheld(self, forms: Sequence[Form]) -> Floats:
-        """Mean squares (blocks,) that base and forms leave where they were not fitted, as rows count."""
+        """Mean squares (blocks,) of the residuals of base and forms in blocks that were not fitted."""
         return withheld(self.data, np.concatenate([self.base, self.columns(forms)], axis=1))
 
     def rms(self, forms: Sequence[Form]) -> float:
         """Rms residual of a joint fit of base and forms to all rows."""
-        left = leftover(self.data, np.concatenate([self.base, self.columns(forms)], axis=1))
+        left = held_out_residuals(self.data, np.concatenate([self.base, self.columns(forms)], axis=1))
         return float(np.sqrt(np.mean(left**2)))
 
 
@@ -88,7 +88,7 @@ def axis_law(
 
 
 def _rows(channel: AxisChannel, moves: Sequence[AxisTravel]) -> _Rows:
-    return _Rows(channel.data, channel.columns, _covariates(moves))
+    return _Rows(channel.residual, channel.columns, _covariates(moves))
 
 
 def _covariates(moves: Sequence[AxisTravel]) -> dict[str, Floats]:

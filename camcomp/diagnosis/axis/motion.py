@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from camcomp.diagnosis.axis.block_least_squares import solve
-from camcomp.diagnosis.axis.findings import ROWS, AxisFindings, AxisRun, Carried
-from camcomp.diagnosis.axis.noise_floor import rows_floor
+from camcomp.diagnosis.axis.findings import ROWS, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.terms import (
     SETTLED,
     WIDE,
@@ -51,11 +48,10 @@ def motion_of(
     values: list[Floats],
     train: list[int],
     late: float | None,
-    led: Callable[[AxisRun], Floats] | None = None,
 ) -> tuple[list[AxisRun], list[AxisTravel], list[Floats]]:
     """What moved while a channel had its values (n,): set-points, as late as they are followed, where that explains them as well.
 
-    led: what the loop makes of the set-points of a run. The noise of an encoder is in its following error, too, and would explain
+    The noise of an encoder is in its following error, too, and would explain
     a part of itself. With the runs and their values, where somebody saw how fast the axis was, and where it no longer matters
     how it moved before its log began.
     """
@@ -67,7 +63,6 @@ def motion_of(
         return [r.of(on) for r, _, _, on in some], [m.of(on) for _, m, _, on in some], [v[on] for _, _, v, on in some]
 
     if late is None:
-        found.carried = Carried([rows_floor([r.encoder]) for r in runs], found.wide)
         return kept(encoders, [r.clear for r in runs])
     mine = [runs[k] for k in train]
     told = [values[k] for k in train]
@@ -75,18 +70,13 @@ def motion_of(
     def misfit(moves: list[AxisTravel]) -> float:
         return _misfit(mine, told, [moves[k] for k in train])
 
-    asked = [r.setpoint if led is None else led(r) for r in runs]
-    ways = {
-        wide: [travel(r.time, way, wide, late) for r, way in zip(runs, asked, strict=True)] for wide in SETPOINT_WIDE
-    }
+    ways = {wide: [travel(r.time, r.setpoint, wide, late) for r in runs] for wide in SETPOINT_WIDE}
     left = {each: misfit(moves) for each, moves in ways.items()}
     wide = next(each for each in ways if left[each] <= SAME_MISFIT * min(left.values()))
     setpoints = ways[wide]
-    if misfit(encoders) < ENCODER_BETTER * misfit(setpoints):
-        found.carried = Carried([rows_floor([r.encoder]) for r in runs], found.wide)
-        return kept(encoders, [r.clear for r in runs])
-    found.carried = Carried([rows_floor([r.setpoint]) for r in runs], wide, late)
-    return kept(setpoints, [r.time >= r.time[0] + SETTLED * late for r in runs])
+    by_encoder = misfit(encoders) < ENCODER_BETTER * misfit(setpoints)
+    settled = [r.time >= r.time[0] + SETTLED * late for r in runs]
+    return kept(encoders if by_encoder else setpoints, settled)
 
 
 def _usual(m: AxisTravel) -> Floats:

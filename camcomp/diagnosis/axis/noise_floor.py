@@ -53,3 +53,14 @@ def spikes(y: Floats, least: float) -> np.ndarray:
     scatter = max(float(median_abs_deviation(off, scale="normal")), rows_floor([known]))
     out[rows] = over > max(SPIKE * scatter, least, step)
     return out if out.mean() <= MOST_SPIKES else np.zeros(len(y), bool)
+
+
+def following_floor(pairs: Sequence[tuple[Floats, Floats]]) -> float:
+    """Deviation of one row of following errors, from set-points and encoders (n,) of runs, with the repeatability.
+
+    A resolution may show in the encoder or the set-points alone.
+    """
+    asked, moved = ([pair[i] for pair in pairs] for i in (0, 1))
+    apart = np.hypot(rows_floor(moved), rows_floor(asked))
+    own = rows_floor([x - y for x, y in pairs])
+    return float(np.hypot(max(own, float(apart)), REPEATABILITY_MM))

@@ -12,26 +12,9 @@ from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import direction, first_order
 from camcomp.model.seams import Seams
 
-PRESLIDING_GRID_MM = (1e-4, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.05, 0.1)  # the first is a step
-TURNING_GRID_MM_PER_S = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.5, 2.5, 5.0, 10.0)
 STANDS_OUT = 1.6  # times the next line of a spectrum
-STRIBECK_MM_PER_S = 10.0
 SETTLED = 5.0  # time constants after which a late axis shows no more how it moved before
 WIDE = (5, 10, 20, 40)  # samples on either side of a local cubic
-
-
-@dataclass(frozen=True)
-class Turning:
-    """How friction turns round at a reversal: over a distance, mm, or where speed is given, with tanh(v / speed), mm/s."""
-
-    distance: float
-    speed: float | None = None
-
-
-TURNINGS = (
-    *(Turning(d) for d in PRESLIDING_GRID_MM),
-    *(Turning(PRESLIDING_GRID_MM[0], v) for v in TURNING_GRID_MM_PER_S),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +34,10 @@ class AxisTravel:
         before = np.concatenate([self.before, self.position[: int(np.argmax(rows))]])
         return AxisTravel(self.time[rows], self.position[rows], self.speed[rows], self.acceleration[rows], before)
 
-    def reversal(self, how: Turning) -> Floats:
-        """Direction of travel (n,), -1 to 1."""
-        if how.speed is not None:
-            return np.asarray(np.tanh(self.speed / how.speed), float)
+    def reversal(self, distance: float) -> Floats:
+        """Direction of travel (n,), -1 to 1, which turns round over a distance, mm."""
         way = np.concatenate([self.before, self.position])
-        return direction(way[:, None], how.distance)[len(self.before) :, 0]
+        return direction(way[:, None], distance)[len(self.before) :, 0]
 
 
 def travel(time: Floats, position: Floats, wide: int = WIDE[0], late: float | None = None) -> AxisTravel:
@@ -77,28 +58,6 @@ def travel(time: Floats, position: Floats, wide: int = WIDE[0], late: float | No
     if late is not None:
         parts[0] = values
     return AxisTravel(time, *(np.interp(time, even, part) for part in parts))
-
-
-def noise_gains(dt: float, wide: int, late: float | None = None) -> tuple[float, float]:
-    """Deviation of speed (1/s) and acceleration (1/s2) of such a cubic per deviation of one position, as in `travel`."""
-    n = 2 * wide + 1 + (0 if not late else int(np.ceil(SETTLED * late / dt)))
-    impulse = np.zeros(3 * n)
-    impulse[n] = 1.0
-    answer = travel(dt * np.arange(3.0 * n), impulse, wide, late)
-    return float(np.linalg.norm(answer.speed)), float(np.linalg.norm(answer.acceleration))
-
-
-def strangers(at: AxisTravel, how: Turning) -> dict[str, tuple[str, Floats]]:
-    """Terms that no effect states, by name: covariate kind and column (n,). They are tried, so that a leftover has a name."""
-    v, d = at.speed / 100.0, at.reversal(how)
-    x = at.position / 100.0
-    return {
-        "position spring": ("position", x),
-        "quadratic viscous": ("velocity", v * np.abs(v)),
-        "cubic viscous": ("velocity", v**3),
-        "Stribeck": ("velocity", d * np.exp(-((at.speed / STRIBECK_MM_PER_S) ** 2))),
-        "friction along the travel": ("position", d * x),
-    }
 
 
 @dataclass(frozen=True, kw_only=True)

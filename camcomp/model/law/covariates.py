@@ -195,7 +195,8 @@ def smooth_rate(values: Floats, motion: Motion, order: int) -> Floats:
     step = float(np.median(np.diff(t[apart])))
     rows = 2 * max(round(0.5 * SMOOTH_S / step), 2) + 1
     even = t[0] + step * np.arange(max(round((t[-1] - t[0]) / step) + 1, rows))
-    found = savgol_filter(np.interp(even, t[apart], values[apart]), rows, 3, deriv=order, delta=step, mode="interp")
+    from_first = np.interp(even, t[apart], values[apart] - values[0])  # exactly 0 at rest
+    found = savgol_filter(from_first, rows, 3, deriv=order, delta=step, mode="interp")
     return np.asarray(np.interp(t, even, found), float)
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.axis.disturbance_window import find_window
 from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
 from camcomp.diagnosis.axis.gate import intervals
-from camcomp.diagnosis.axis.push import find_window
 from camcomp.diagnosis.axis.study import study
 
 FORCE, NOISE = 60.0, 0.5

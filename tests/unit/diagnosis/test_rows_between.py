@@ -29,12 +29,9 @@ def both_predictions(step, cause, wanted):
         temperature=np.full(n, np.nan), tip_sd=nothing,
     )  # fmt: skip
     axis = DrivenAxis(
-        AxisRun(name="r", time=t, setpoint=wanted(t), encoder=wanted(t), force=np.full(n, np.nan)),
-        robot.actuators[0],
-        1.0,
-        0 * t,
-        0 * t,
-    )
+        run=AxisRun(name="r", time=t, setpoint=wanted(t), encoder=wanted(t), force=np.full(n, np.nan)),
+        actuator=robot.actuators[0], lever=1.0, weight=0 * t, inertia=0 * t,
+    )  # fmt: skip
     return t, predict_encoders(robot, [cause], log, 0.0)[:, 0], -axis.channel("following", [cause])
 
 

@@ -27,7 +27,6 @@ def result(tmp_path_factory):
         "--write-config", folder / "better.yaml",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr.decode()
-    assert list((folder / "learned").glob("law_*.json"))
     (entry,) = [e for e in yaml.safe_load((folder / "better.yaml").read_text())["effects"] if e["effect"] == "formula"]
     assert (entry["stage"], entry["target"]) == ("control", "x")
     return json.loads((folder / "o.json").read_text())
@@ -54,11 +53,18 @@ def test_friction_with_its_asymmetry(result):
 
 
 def test_no_spring_and_no_cubic_are_made_up(result):
-    assert {c["effect"] for c in result["causes"]} == {"servo_lag", "friction", "unknown"}
-    tried = result["axes_in_detail"]["x"]["force"]["tried"]
-    assert abs(tried["position spring"]["z"]) < 2.0
-    assert tried["cubic viscous"]["gain"] < 0.03
-    assert all(d["covariate"] == "position:x" for d in result["where"]["drivers"])
+    assert {c["effect"] for c in result["causes"]} == {"servo_lag", "servo_overshoot", "friction", "unknown"}
+
+
+def test_the_loop_swings_as_the_known_controller_does(result):
+    """M x'' = K (kp (c - x) - x') - F x': damping 1 / (2 T w), w^2 = kp g / T, T = M / (K + F), g = K / (K + F)."""
+    by_speed, mass, viscous, kp = 35.15065188 * 243.45, 95.1, 203.5, 160.18
+    time = mass / (by_speed + viscous)
+    w = (kp * by_speed / (by_speed + viscous) / time) ** 0.5
+    found = cause(result, "servo_overshoot")["parameters"]
+    assert found["period_ms"]["value"] == pytest.approx(2e3 * 3.141592653589793 / w, rel=0.06)
+    low, high = found["damping"]["ci95"]
+    assert low < 1.0 / (2.0 * time * w) < high
 
 
 def test_ripple_of_the_screw_is_located_in_the_drive_force(result):
@@ -69,15 +75,15 @@ def test_ripple_of_the_screw_is_located_in_the_drive_force(result):
     assert result["verdict"] == "unknown"
 
 
-def test_the_ripple_is_a_law_that_shrinks_withheld_stretches(result):
+def test_the_ripple_is_a_law_of_the_drive_force_alone(result):
+    """The loop answers 1 N at 2.5 mm by 0.8 um up to 50 mm/s and by 0.1 um at 125 mm/s: by no function of the position alone."""
     law = cause(result, "unknown")["law"]
     periods = {float(each) for each in re.findall(r"act_mm/([\d.]+)", law["formula"])}
     assert all(each == pytest.approx(2.50, rel=0.004) for each in periods)
     force = [each["value"] for each in law["terms"] if each["term"].startswith("force x") and each["unit"] == "N"]
     ways = [each["term"] for each in law["terms"]]
-    assert len(force) == 4 and "max(way" in ways[0] and "max(-way" in ways[2]
+    assert len(force) == len(law["terms"]) == 4 and "max(way" in ways[0] and "max(-way" in ways[2]
     assert all(0.8 < (a * a + b * b) ** 0.5 < 1.4 for a, b in (force[:2], force[2:]))
-    assert law["after_rms_um"] < 0.95 * law["before_rms_um"]
 
 
 def test_presliding_is_no_step(result):

@@ -29,12 +29,12 @@ def test_what_two_columns_do_that_differ_in_one_block_only_is_left_open_there():
     assert np.mean(left[1:]) == pytest.approx(1.0, rel=0.1)
 
 
-@pytest.mark.parametrize(("telling", "foretold"), [(None, False), (1, True)])
-def test_runs_in_which_an_axis_stands_foretell_nothing_of_the_one_in_which_it_moves(telling, foretold):
+@pytest.mark.parametrize(("moving", "foretold"), [(None, False), (1, True)])
+def test_runs_in_which_an_axis_stands_foretell_nothing_of_the_one_in_which_it_moves(moving, foretold):
     """Whole runs of four are the folds; a single informative run is split into stretches."""
     rng = np.random.default_rng(2)
     times = [np.linspace(0.0, 10.0, 1000)] * 4
     columns = [np.zeros(1000)] * 3 + [np.sin(np.linspace(0.0, 60.0, 1000))]
     values = [5.0 * c + 0.1 * rng.standard_normal(1000) for c in columns]
-    data = series(times, values, telling)
+    data = series(times, values, moving)
     assert (withheld(data, np.concatenate(columns)[:, None]).max() < 0.1) == foretold

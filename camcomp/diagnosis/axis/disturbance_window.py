@@ -1,4 +1,4 @@
-"""Whether something pushed an axis for a while: a window of one run in which its drive force is shifted."""
+"""Is there a disturbance force: a window of one run in which the drive force of an axis is shifted?"""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.stats import norm
 
 from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.ground.datatypes import Bools, Floats, Ints
@@ -29,13 +28,12 @@ SHARP_S, SHARP = (
 
 @dataclass(frozen=True)
 class Window:
-    """Rows first to last (exclusive) of a run, counted from 0; shift N; log10 of the chance that noise looks like this."""
+    """Rows first to last (exclusive) of a run, counted from 0; shift N."""
 
     run: int
     first: int
     last: int
     shift: float
-    chance: float
 
 
 def find_window(
@@ -48,7 +46,6 @@ def find_window(
     """
     rests, bases = _projected(values, beside)
     best: tuple[float, int, int, int] | None = None
-    tried = 0
     for k, rest in rests.items():
         step = float(np.median(np.diff(times[k])))
         cell = max(round(CELL_S / step), 1, len(rest) // 400)
@@ -66,12 +63,11 @@ def find_window(
         own = n - np.sum(inside[:, :-1] ** 2, axis=1)  # of the window, beside the columns
         score = np.where(own > LEAST_OWN * n, inside[:, -1] ** 2 / np.maximum(own, 1e-300), 0.0)
         at = int(np.argmax(score))
-        tried += len(n)
         if best is None or score[at] > best[0]:
             best = float(score[at]), k, int(edges[i[at]]), int(edges[j[at]])
     if best is None:
         return None
-    score_of, k, first, last = best
+    _, k, first, last = best
     shift, rest = _alone(rests[k], bases[k], first, last)
     step = float(np.median(np.diff(times[k])))
     first, last = _placed(rest, first, last, FARTHEST * max(round(CELL_S / step), 1, len(rest) // 400))
@@ -84,8 +80,7 @@ def find_window(
     parts = [float(np.mean(p) - np.mean(rest[outside])) for p in np.array_split(rest[inside], QUARTERS)]
     if not all(abs(p - shift) < LEVEL * abs(shift) for p in parts):
         return None
-    chance = float(norm.logsf(np.sqrt(score_of) / floor) / np.log(10.0))
-    return Window(k, first, last, shift, min(chance + float(np.log10(tried)), 0.0)), rest
+    return Window(k, first, last, shift), rest
 
 
 def _projected(
@@ -138,11 +133,6 @@ def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
     mine = at[window.run][window.first : window.last]
     others = [np.delete(p, slice(window.first, window.last)) if k == window.run else p for k, p in enumerate(at)]
     return float(np.isin(mine, np.concatenate(others)).mean()) > BEEN
-
-
-def edges(window: Window, time: Floats) -> Floats:
-    """N (n,) that rows of its run are not known to for it: at its ends, which no log shows sharper than SHARP_S."""
-    return np.where(_at_ends(window.first, window.last, time), abs(window.shift), 0.0)
 
 
 def away_from_ends(first: int, last: int, time: Floats) -> tuple[Bools, Bools]:

@@ -1,0 +1,74 @@
+"""Rows of one channel of an axis, and the priors of the sizes that every axis has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.diagnosis.axis.effect_columns import AxisCause
+from camcomp.diagnosis.axis.gate import within_a_row
+from camcomp.ground.datatypes import Floats
+
+HEALTHY_SHARE = 0.3  # of the channel's size: scale of a size that every axis has
+CLOCK, TURNING = "clock", "turning"  # kinds: rows that are late; friction while it turns round, limited by its peak
+Sizes = Mapping[str, Floats]  # kind -> columns (n, q)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ChannelData:
+    """Rows of one channel, per run: values (n,), columns of healthy sizes, covariates (n,) of the dictionary.
+
+    response: what causes with their amplitudes (d,) add to the channel of run k (n,). floor: noise of the channel. train: runs
+    that are fitted. level: constant without a meaning. times (n,) s per run. clock: standard deviation of the instants of rows
+    against the motion, s. noise (n,) per run: of rows, in floors; 1 where it is not given.
+    """
+
+    values: Sequence[Floats]
+    healthy: Sequence[Sizes]
+    covariates: Sequence[Mapping[str, Floats]]
+    response: Callable[[int, Sequence[tuple[AxisCause, Floats]]], Floats]
+    floor: float
+    train: Sequence[int]
+    times: Sequence[Floats]
+    level: float = 0.0
+    clock: float = 0.0
+    noise: Sequence[Floats] = ()
+
+    def in_floors(self, rows: Mapping[int, Floats]) -> Floats:
+        """Rows of the fitted runs one after the other, each over its noise in floors. rows: values (n,) or columns (n, k) by run."""
+        each = [(rows[k].T / self.noise[k]).T if self.noise else rows[k] for k in self.train]
+        return np.concatenate(each)
+
+    def healthy_columns(self, run: int) -> Floats:
+        """Columns (n, q) of healthy sizes of all kinds."""
+        return np.concatenate([*self.healthy[run].values()], axis=1)
+
+    @property
+    def scales(self) -> dict[str, Floats]:
+        """Standard deviations (q,) of the amplitudes of healthy columns before the rows are seen, by kind."""
+        size = float(np.sqrt(np.mean(np.concatenate([self.values[k] for k in self.train]) ** 2)))
+        out = {}
+        for kind in self.healthy[0]:
+            own = np.concatenate([self.healthy[k][kind] for k in self.train])
+            each = np.abs(own).max(axis=0) if kind == TURNING else np.sqrt(np.mean(own**2, axis=0))
+            most = HEALTHY_SHARE * max(size, self.floor)
+            out[kind] = np.divide(most, each, out=np.zeros_like(each), where=each > 0.0)
+            out[kind] = np.full(1, self.clock) if kind == CLOCK else out[kind]
+        return out
+
+    def refined(self, left: Sequence[Floats], sizes: Mapping[str, Floats]) -> ChannelData:
+        """The data with a column for rows that are later or earlier than the motion, and with the noise of rows in which inertia
+        is not known to the floor: the instant of a force within its row is not known.
+
+        left: residuals (n,) per run. sizes: healthy sizes by kind of the same fit.
+        """
+        if self.clock == 0.0:
+            return self
+        slopes = [np.gradient(y - each, t)[:, None] for y, each, t in zip(self.values, left, self.times, strict=True)]
+        inertia = [own["acceleration"] @ sizes["acceleration"] for own in self.healthy]
+        return replace(
+            self, healthy=[{**own, CLOCK: each} for own, each in zip(self.healthy, slopes, strict=True)],
+            noise=[np.hypot(1.0, within_a_row(each) / self.floor) for each in inertia],
+        )  # fmt: skip
