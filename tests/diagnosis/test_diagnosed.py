@@ -28,6 +28,7 @@ def test_nothing_is_wrong(tmp_path):
     assert truth["noise_um"] <= result["floor"]["um"] <= 1.5 * truth["noise_um"]
 
 
+@pytest.mark.campaign  # test_every_machine has one in the plain run
 def test_play_is_play(tmp_path):
     plan = Plan(4, "single", (("backlash", "y"),), (3.0,), rapids=True, **SMALL)
     result, truth = answer(plan, tmp_path)

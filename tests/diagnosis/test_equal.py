@@ -74,6 +74,7 @@ def test_the_classes_are_known_without_residuals(workshop):
     assert groups(likeness(replace(design, white_residual=[0.0 * r for r in design.white_residual]))) == there
 
 
+@pytest.mark.campaign
 def test_an_encoder_tells_a_lag_from_a_late_clock_before_anything_is_measured(workshop):
     there = groups(likeness(workshop.answer(LONG)[1].problem))
     assert not any(("servo_lag", None) in group for group in there)

@@ -62,7 +62,9 @@ def later_lines(by):
 @pytest.mark.parametrize(
     ("change", "rule", "said"),
     [
-        (scaled(ENCODERS, 180 / np.pi), "CC407", "encoders look as if logged in degrees"),
+        pytest.param(
+            scaled(ENCODERS, 180 / np.pi), "CC407", "encoders look as if logged in degrees", marks=pytest.mark.campaign
+        ),
         (scaled(SETPOINTS + ENCODERS, 180 / np.pi), "CC407", "setpoints look as if logged in degrees"),
         (exchanged(("act_A2_rad", "act_A3_rad")), "CC408", "right with A2 and A3 exchanged"),
         (scaled(["act_A2_rad"], -1.0), "CC408", "right with A2 reversed"),

@@ -12,12 +12,13 @@ CREEP = plan_of(("creep", "x"), design="six", samples=150)
 CROSSTALK = plan_of(("force_crosstalk", "y"), design="six", samples=150, seed=62)
 
 
+@pytest.mark.campaign  # those below have some in the plain run
 @pytest.mark.parametrize(
     ("plan", "driver"),
     [
         (GROWTH, ("time:z", "temperature:z")),
-        pytest.param(CREEP, ("time:x", "temperature:x"), marks=pytest.mark.campaign),
-        pytest.param(CROSSTALK, ("force:z",), marks=pytest.mark.campaign),
+        (CREEP, ("time:x", "temperature:x")),
+        (CROSSTALK, ("force:z",)),
     ],
 )
 def test_what_differs_from_run_to_run_is_not_taken_for_something_that_lasts(workshop, plan, driver):

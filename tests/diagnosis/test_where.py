@@ -25,6 +25,7 @@ def test_a_screw_that_runs_out_shows_at_its_actuator_and_pitch(workshop, where):
     assert found["frequencies"] == []
 
 
+@pytest.mark.campaign  # the screw has one in the plain run
 def test_a_vibration_shows_at_its_axis_and_frequency(workshop, where):
     truth = dict(workshop.made(VIBRATION)[1].truth.foreign)["floor_vibration"]
     found = where(VIBRATION)

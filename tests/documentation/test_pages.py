@@ -17,6 +17,7 @@ FOLLOWED = sorted(
     path for path in DOCS.rglob("*.md") if any(isinstance(each, Command) for each in steps(path.read_text("utf-8")))
 )
 FOLLOWED += [ROOT / "samples/tutorial.md", ROOT / "samples/diagnosis/README.md"]
+SLOW = ("static-poses",)  # pages whose commands take a minute
 
 
 @pytest.fixture
@@ -25,7 +26,11 @@ def reader(tmp_path):
     return Reader(tmp_path / "folder", tmp_path / "tools")
 
 
-@pytest.mark.parametrize("path", FOLLOWED, ids=lambda path: path.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(each, marks=pytest.mark.campaign) if each.stem in SLOW else each for each in FOLLOWED],
+    ids=lambda path: path.relative_to(ROOT).as_posix(),
+)
 def test_commands_of_a_page_print_what_stands_there(path, reader):
     """They run in a folder that holds config and samples."""
     for name in ("config", "samples"):

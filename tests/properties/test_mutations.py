@@ -93,7 +93,7 @@ def test_robot_programs(tmp_path, name, text):
     random, ends = Random(8), set()
     tokens = re.findall(r"\w+|\s+|[^\w\s]", text)
     (tmp_path / "frames.yaml").write_text(FRAMES)
-    for _ in range(150):
+    for _ in range(50):
         changed = list(tokens)
         for _ in range(random.choice((1, 1, 2, 3))):
             changed[random.randrange(len(changed))] = random.choice((*TOKENS, random.choice(tokens), ""))
@@ -142,7 +142,7 @@ def test_logs(tmp_path):
         f"config: [{machine}]\nruns: [{{name: a, program: {program}, log: log.csv, cutting: true}}]\n"
     )
     ends = set()
-    for number in range(60):
+    for number in range(30):
         data = mutated_table(random, good.read_bytes())
         log.write_bytes(data)
         ends.add(end_of(data, "compare", log, good))

@@ -78,6 +78,7 @@ class LinearModel:
         self.layout = ColumnLayout.of(self.groups)
         self._grams: dict[SmoothProcess | None, tuple[NormalEquations, ...]] = {}
         self._totals: dict[tuple[SmoothProcess | None, tuple[int, ...]], NormalEquations] = {}
+        self._reduced: dict[tuple[Background, tuple[int, ...]], Reduced] = {}
         self.candidates = tuple(self._seen(each) for each in self.candidates)
 
     def with_columns(self, kept: np.ndarray) -> LinearModel:
@@ -203,13 +204,16 @@ class LinearModel:
 
     def reduced(self, background: Background, groups: Sequence[int] | None = None) -> Reduced:
         """Normal equations of the effects with all else integrated out."""
-        at = self.posterior(background, None, groups)
-        k = self.layout.effects
-        effects = np.flatnonzero(self.size > 0.0)
-        own, by = at.without(effects)
-        gram, moment = np.zeros((k, k)), np.zeros(k)
-        gram[np.ix_(effects, effects)], moment[effects] = own, by
-        return Reduced(self, gram, moment, at.log_evidence)
+        key = background, tuple(self.own if groups is None else groups)
+        if key not in self._reduced:
+            at = self.posterior(background, None, groups)
+            k = self.layout.effects
+            effects = np.flatnonzero(self.size > 0.0)
+            own, by = at.without(effects)
+            gram, moment = np.zeros((k, k)), np.zeros(k)
+            gram[np.ix_(effects, effects)], moment[effects] = own, by
+            self._reduced[key] = Reduced(self, gram, moment, at.log_evidence)
+        return self._reduced[key]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
