@@ -16,6 +16,7 @@ from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.result import Summary
 from camcomp.compensation.report import tables
 from camcomp.compensation.report.joint_table import joint_bytes
+from camcomp.compensation.totals import Totals
 from camcomp.gcode.stamp import is_stamped
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import display_name, open_source, read_bytes, write_all
@@ -48,9 +49,13 @@ class CompensatedProgram:
         return self.data.decode("utf-8", "surrogateescape")
 
     @cached_property
+    def _totals(self) -> Totals:
+        return Totals.of(self.outcome, self.machine)
+
+    @cached_property
     def summary(self) -> Summary:
         """The figures of `compensate --summary`."""
-        return tables.summary(self.outcome, self.machine)
+        return self._totals.summary()
 
     @cached_property
     def joints(self) -> ResultTable:
@@ -65,7 +70,7 @@ class CompensatedProgram:
     @property
     def failed(self) -> list[tuple[str, str]]:
         """Rule id and text of every failed check; empty: the corrected program may run."""
-        return self.outcome.failed_checks(self.machine, self.tolerance_um)
+        return self._totals.failed_checks(self.tolerance_um)
 
     def joint_file(self, name: str) -> bytes:
         """The joint table as the bytes of a file called `name`: CSV, or Parquet by its suffix."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from camcomp.api.machine import Job, Program, program_in
 from camcomp.api.result_table import ResultTable
-from camcomp.compensation.program.cut_surface import cut_surface
+from camcomp.compensation.program.loaded_cut import cut_surface
 from camcomp.model.from_program import StockChoice, job_of_program
 from camcomp.model.motion import simulate as story
 from camcomp.model.motion.simulate import Simulated

@@ -15,7 +15,7 @@ from camcomp.ground.files import writing
 from camcomp.model.job import Job
 
 if TYPE_CHECKING:
-    from camcomp.compensation.long.totals import Totals
+    from camcomp.compensation.totals import Totals
 
 LONG = 1 << 14  # bytes from which it pays to interpolate: some 500 lines
 MOST_EXACT = 1 << 20  # bytes up to which a program is solved point by point where its interpolation is not good enough
@@ -83,7 +83,7 @@ def compensate_in_pieces(
         table = joints() if joints is not None else None
         pieces = LongProgram(
             job=job, name=name, setup=setup_of(job.config), tolerance_um=settings.tolerance_um,
-            version=settings.version, arcs=settings.arcs, on_rows=None if table is None else table.batch,
+            version=settings.version, arcs=settings.arcs, on_rows=None if table is None else table.add,
         )  # fmt: skip
         totals = pieces.run(source, program)
         if table is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -79,6 +80,13 @@ class Path:
 
     def __len__(self) -> int:
         return int(self.line.shape[0])
+
+    @classmethod
+    def joined(cls, parts: Sequence[Path]) -> Path:
+        """Concatenation of paths without orientation."""
+        names = [each.name for each in fields(cls) if each.name != "orientation"]
+        columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        return cls(**columns)
 
     def take(self, rows: NDArray[Any]) -> Path:
         """The motions with indices or mask `rows`."""

@@ -10,7 +10,7 @@ from camcomp.compensation.long import control_account
 from camcomp.compensation.long.program import LongProgram
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.verify import verify
-from camcomp.compensation.report.tables import summary
+from camcomp.compensation.totals import Totals
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import ARC
 from camcomp.ground.files import shipped
@@ -163,7 +163,7 @@ def test_long_programs_take_the_same_time_and_go_as_far_off(orthoglide, mode, mo
     mine = bulk.run(io.BytesIO(text), len).summary()
     program = program_of(text, "p.nc", orthoglide.config)
     whole = compensate(program, orthoglide, method="newton", tolerance_um=1.0, version="1")
-    theirs = summary(whole, orthoglide)
+    theirs = Totals.of(whole, orthoglide).summary()
     assert mine.control_mode == theirs.control_mode == mode
     kept_apart = [each for each in mine.warnings if "around the cuts" in each]
     assert kept_apart == [each for each in theirs.warnings if "around the cuts" in each] and bool(kept_apart) == (
@@ -249,7 +249,7 @@ def test_verify_repeats_what_the_control_makes_of_it(orthoglide, mode):
     """Its points lie closer than those of the summary and count the residual across the path only."""
     done = compensated(orthoglide, ["G4 P3", *circle(25.0, 3000)], mode, arcs=False)
     text = program_of(done.written.data, "out.nc", orthoglide.config)
-    told, mine = verify(text, done.program, orthoglide).figures(1.0), summary(done, orthoglide)
+    told, mine = verify(text, done.program, orthoglide).figures(1.0), Totals.of(done, orthoglide).summary()
     assert told.control_mode == mine.control_mode == mode and told.control_mode_stated
     assert told.cycle_time_s.before == pytest.approx(mine.cycle_time_s.before) and told.cycle_time_s.before > 3.0
     assert told.cycle_time_s.after == pytest.approx(mine.cycle_time_s.after, rel=1e-4)

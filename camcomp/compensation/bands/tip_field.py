@@ -43,6 +43,19 @@ class TipField:
         self._known, self._values = np.zeros((0, 6)), np.zeros((0, 0))  # what fits rest on
         self.solved = 0
 
+    def moves(self, commanded: Floats, force: Floats, changes: Sequence[Sequence[Floats]]) -> TipMoves:
+        """Moves at commanded tips (n, 3), program frame, under forces (n, 3) N, machine frame.
+
+        changes: of the force, by the sides of every input, each (n, 3) N; none for inputs that leave it as it is.
+        """
+        moves, compliance = self.at(commanded, force)
+        for j, (each, sides) in enumerate(zip(self.inputs, changes, strict=True)):
+            if sides:
+                slope, bend = of_sides(each, np.zeros_like(commanded), sides)
+                moves.slope[:, :, j] += np.einsum("nij,nj->ni", compliance, slope)
+                moves.bend[:, :, j] += np.einsum("nij,nj->ni", compliance, bend)
+        return moves
+
     def at(self, commanded: Floats, force: Floats) -> tuple[TipMoves, Floats]:
         """Moves at commanded tips (n, 3), program frame, under forces (n, 3) N, machine frame, and compliances (n, 3, 3).
 

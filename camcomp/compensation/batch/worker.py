@@ -21,10 +21,12 @@ from camcomp.ground.progress import watched
 from camcomp.model.config.spec import Config
 
 if TYPE_CHECKING:
+    from camcomp.compensation.totals import Totals
     from camcomp.model.from_program import StockChoice
     from camcomp.model.job import Job
 
 BUG = 70
+TABLE = "joints.csv"
 WATCH = 0.5  # s between two looks at the parent
 keep_old_names()  # tasks bring parameters of users' plug-ins, whose modules are imported before anything is asked of them
 
@@ -103,7 +105,8 @@ def work(task: Task) -> Outcome:
 
 def _compensate(task: Task) -> Outcome:
     from camcomp.compensation.program.compensate import compensate
-    from camcomp.compensation.report import tables
+    from camcomp.compensation.report.joint_table import joint_bytes
+    from camcomp.compensation.totals import Totals
     from camcomp.gcode.stamp import is_stamped
     from camcomp.ground.errors import CheckFailed
     from camcomp.model.control import program_of
@@ -120,13 +123,8 @@ def _compensate(task: Task) -> Outcome:
         return outcome
     program = program_of(task.data, task.name, config)
     result = compensate(program, job, method=task.method, tolerance_um=task.tolerance_um, version=__version__)
-    failed = result.failed_checks(job, task.tolerance_um)
-    joints = tables.joint_csv(result, job) if task.joints else None
-    figures = tables.summary(result, job).as_json()
-    outcome = Outcome(
-        key=task.key, exit_code=int(bool(failed)), messages=_checks(task, failed), program=result.written.data,
-        joints=joints, figures=figures, notes=held(),
-    )  # fmt: skip
+    joints = joint_bytes(result, job, TABLE) if task.joints else None
+    outcome = _outcome(task, Totals.of(result, job), result.written.data, joints)
     _settle()
     return outcome
 
@@ -140,20 +138,20 @@ def _in_pieces(task: Task, job: Job) -> Outcome | None:
     totals = compensate_in_pieces(
         source=BytesIO(task.data), name=task.name, job=job,
         settings=CorrectionSettings(method=task.method, tolerance_um=task.tolerance_um, version=__version__),
-        program=program.write, joints=partial(joint_table, joints, "joints.csv", job) if task.joints else None,
+        program=program.write, joints=partial(joint_table, joints, TABLE, job) if task.joints else None,
     )  # fmt: skip
     if totals is None:
         return None
+    return _outcome(task, totals, program.getvalue(), joints.getvalue() if task.joints else None)
+
+
+def _outcome(task: Task, totals: Totals, program: bytes, joints: bytes | None) -> Outcome:
     failed = totals.failed_checks(task.tolerance_um)
+    checks = [{"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"} for rule, text in failed]
     return Outcome(
-        key=task.key, exit_code=int(bool(failed)), messages=_checks(task, failed), program=program.getvalue(),
-        joints=joints.getvalue() if task.joints else None, figures=totals.summary().as_json(), notes=held(),
+        key=task.key, exit_code=int(bool(failed)), messages=checks, program=program, joints=joints,
+        figures=totals.summary().as_json(), notes=held(),
     )  # fmt: skip
-
-
-def _checks(task: Task, failed: list[tuple[str, str]]) -> list[dict[str, Any]]:
-    """Messages of failed checks."""
-    return [{"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"} for rule, text in failed]
 
 
 @lru_cache(maxsize=1)

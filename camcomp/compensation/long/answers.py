@@ -10,7 +10,7 @@ import numpy as np
 from camcomp.compensation.long.field import Field
 from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.compensation.program.compensate import Compensated, compensate
-from camcomp.compensation.program.result import BOUND_UM, Interpolation
+from camcomp.compensation.program.result import Interpolation
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.job import Job
@@ -94,17 +94,8 @@ class InterpolatedMachine:
         aimed, free = self.solve(TARGET, p, f, None), self.solve(FREE, p, f, None)
         exact = correct(self.machine, p, f)
         tip, settled = settle(self.machine, p, f)
-        reach = np.where(self.machine.revolute, 1000.0, 1.0)
-        gaps = (aimed.commanded - exact.commanded, free.tip - tip, (aimed.rho - exact.rho) * reach)
-        worst = max(1e3 * float(np.abs(each).max()) for each in gaps)
-        self._field.keep(sound=worst <= BOUND_UM)
-        used = self._field.used
-        return Interpolation(
-            bound_um=BOUND_UM, checked=len(p), worst_um=worst if np.isfinite(worst) else float("inf"),
-            worst_drive_force=float(np.nan_to_num(np.abs(free.drive - settled.drive), nan=np.inf).max()),
-            tiles=int(used.sum()),
-            exact_solutions=int(self._field.tiles.solved[used].sum()) + 2 * len(p) + self._exact,
-        )  # fmt: skip
+        gaps, drive = (aimed.commanded - exact.commanded, free.tip - tip), free.drive - settled.drive
+        return self._field.proof(gaps, aimed.rho - exact.rho, drive, 2 * len(p) + self._exact)
 
 
 def compensate_whole(program: Program, job: Job, *, method: str, **settings: Any) -> Compensated:

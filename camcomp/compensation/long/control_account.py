@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.compensation.program.result import ErrorSum
 from camcomp.compensation.program.under_control import FarOff
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves
@@ -45,8 +46,7 @@ class ControlAccount:
 
     def __init__(self, limits: ControlLimits, tolerance_mm: float) -> None:
         self.limits, self.tolerance = limits, tolerance_mm
-        self.seconds = self.squares = self.most = 0.0
-        self.count = 0
+        self.seconds, self.errors = 0.0, ErrorSum()
         self.beside, self.elsewhere = FarOff(), FarOff()
         self._moves: list[ToolMoves] = []
         self._points: list[SeenPoints] = []
@@ -87,14 +87,11 @@ class ControlAccount:
         self._waiting, self._planned = len(moves) - keep, until - keep
 
     def _tell(self, points: SeenPoints, error: Floats) -> None:
-        square = np.einsum("ni,ni->n", error, error)
-        good = np.isfinite(square)
-        self.squares += float(square[good].sum())
-        self.count += int(good.sum())
-        self.most = max(self.most, float(np.sqrt(square[good].max(initial=0.0))))
-        far = np.flatnonzero(good & (square > (self.tolerance * (1.0 + 1e-9)) ** 2))
+        self.errors.add(error)
+        size = np.linalg.norm(error, axis=1)
+        far = np.flatnonzero(np.isfinite(size) & (size > self.tolerance * (1.0 + 1e-9)))
         if len(far):
-            size, joined = 1e3 * np.sqrt(square[far]), points.joined[far]
+            size, joined = 1e3 * size[far], points.joined[far]
             self.beside = self.beside.with_more(points.line[far[joined]], size[joined])
             self.elsewhere = self.elsewhere.with_more(points.line[far[~joined]], size[~joined])
 

@@ -5,11 +5,33 @@
 
 import math
 
-from camcomp.compensation.long.kernel import path_force, set_row
 from camcomp.ground.compiled import entry, inner
 from camcomp.ground.datatypes import RAPID
 from camcomp.model.cutting.track import NO_FORCE, SAME_FORCE
-from camcomp.model.statics.vectors import dot, part, plus
+from camcomp.model.statics.vectors import cross, dot, part, plus
+
+
+@inner
+def path_force(t, axis, components):
+    """Force (3,) of components (Fr, Ft, Fz) for the unit feed direction t, and the sine of t to the tool axis."""
+    across = plus(t, axis, -dot(t, axis))
+    size = math.sqrt(dot(across, across))
+    if not size > 1e-6:
+        return (0.0, 0.0, 0.0), size
+    x = (across[0] / size, across[1] / size, across[2] / size)
+    right = cross(x, axis)
+    a, b, c = components[0], components[1], components[2]
+    return (
+        a * right[0] + b * x[0] + c * axis[0],
+        a * right[1] + b * x[1] + c * axis[1],
+        a * right[2] + b * x[2] + c * axis[2],
+    ), size
+
+
+@inner
+def set_row(out, i, v):
+    """Fills row i of out (n, 3)."""
+    out[i, 0], out[i, 1], out[i, 2] = v
 
 
 @inner

@@ -6,20 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.compensation.long.plain_run import PlainRun
-from camcomp.ground.datatypes import RAPID, Path
 from camcomp.model.cutting.engaged import Engaged
-
-
-def path_of_run(run: PlainRun) -> Path:
-    """The motions of a run of plain lines."""
-    plain, n, state = run.plain, run.motions, run.state
-    return Path(
-        line=plain.row + run.row0 + 1, kind=plain.kind, start=plain.start, end=plain.end, centre=np.full((n, 3), np.nan),
-        axis=np.zeros((n, 3)), angle=np.zeros(n), feed=np.where(plain.kind == RAPID, np.nan, plain.feed),
-        speed=np.full(n, state.speed), turn=np.full(n, state.sense), tool=np.full(n, state.tool),
-        known=np.ones(n, np.bool_), machine=np.zeros(n, np.bool_),
-    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,7 @@ from camcomp.compensation.long.kernel import (
     put_cells,
 )
 from camcomp.compensation.long.tile_files import TileFiles
+from camcomp.compensation.program.result import BOUND_UM, Interpolation
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.solve import FREE, TARGET, solve, threads
@@ -197,6 +198,24 @@ class Field:
         if self._files is not None and (self.tiles is not self._loaded or not sound):
             self._files.save(self._key, vars(self.tiles) if sound else None)
 
+    def proof(self, gaps: tuple[Floats, ...], joints: Floats, drive: Floats, solved: int) -> Interpolation:
+        """Result of a check by points (k,) solved exactly; keeps the tiles if they are good enough.
+
+        gaps (k, 3) mm, joints (k, m), drive (k, m): differences; solved: exact solutions besides those of the tiles.
+        """
+        worst = max(1e3 * float(np.abs(each).max()) for each in (*gaps, joints * self.reach))
+        self.keep(sound=worst <= BOUND_UM)
+        return Interpolation(
+            bound_um=BOUND_UM, checked=len(drive), worst_um=worst if np.isfinite(worst) else float("inf"),
+            worst_drive_force=float(np.nan_to_num(np.abs(drive), nan=np.inf).max()), tiles=int(self.used.sum()),
+            exact_solutions=int(self.tiles.solved[self.used].sum()) + solved,
+        )  # fmt: skip
+
+    @property
+    def reach(self) -> Floats:
+        """(m,) mm by which a step of an actuator, mm or rad, counts: a hinge moves what is a metre away."""
+        return np.where(self.machine.revolute, 1000.0, 1.0)
+
     def mark(self, tile: Ints) -> None:
         """Count tiles (n,), negative ones left out, as used."""
         self.used = np.append(self.used, np.zeros(len(self.tiles.half) - len(self.used), np.bool_))
@@ -337,9 +356,8 @@ class Field:
         error (6 + 2 m,) as in _aimed, off (m,) of the joints, drive (m,) largest forces.
         """
         m = len(off)
-        reach = np.where(self.machine.revolute, 1000.0, 1.0)  # mm at a metre from a hinge
         drives = error[6 : 6 + m] / np.maximum(1.0, drive) * (ALLOWED / DRIVE_ALLOWED)
-        return float(max(error[:3].max(), ((off + error[6 + m :]) * reach).max(), drives.max()))
+        return float(max(error[:3].max(), ((off + error[6 + m :]) * self.reach).max(), drives.max()))
 
     def _aimed(self, samples: Floats, centre: Floats, half: float, check: bool) -> Floats | None:
         """Correction, tilt, drives, change of the joints, joints (k, 6 + 3 m), solved exactly at samples of a cube.

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
-from camcomp.compensation.long.engagement import path_of_run
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.long.runs import InterpretedRun, Runs
 from camcomp.gcode.setup import Setup
@@ -43,7 +42,7 @@ class FollowedRuns:
             for run in runs:
                 if isinstance(run, PlainRun):
                     if stock.type == "program":
-                        bounds.add(path_of_run(run))
+                        bounds.add(run.path())
                     elif (run.plain.kind != RAPID).any():
                         bounds.tools.add(run.state.tool)
                 elif isinstance(run, InterpretedRun) and run.motions:
@@ -56,7 +55,7 @@ class FollowedRuns:
 
         Raises ProgramError CC142 for rapids through material.
         """
-        both = path if ahead is None else _joined(path, ahead)
+        both = path if ahead is None else Path.joined([path, ahead])
         found, crashes = self.memory.follow(both, ahead=0 if ahead is None else len(ahead))
         text = "the rapid goes through material of the stock"
         lines = np.unique(path.line[crashes]).tolist()
@@ -70,9 +69,3 @@ class FollowedRuns:
         """Warnings at the end. Raises ConfigError CC298 when nothing was cut."""
         refuse_untouched(self.job.config, self.memory)
         return stock_warnings(self.remarks)
-
-
-def _joined(first: Path, second: Path) -> Path:
-    columns = [name for name in Path.__dataclass_fields__ if name != "orientation"]
-    both: dict[str, Any] = {name: np.concatenate((getattr(first, name), getattr(second, name))) for name in columns}
-    return Path(**both)

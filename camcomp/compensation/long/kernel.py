@@ -1,8 +1,6 @@
-"""The inner loops of long programs, compiled: forces along straight moves, and interpolation inside tiles.
+"""The inner loops of the interpolation inside tiles, compiled.
 
-The forces are those of cutting/track.py; tests hold both ways against each other. The interpolation is by Chebyshev
-polynomials in the position times Chebyshev polynomials in the force. All of it stands in one file, because numba only
-sees a change in the file of the function that it kept compiled.
+It is by Chebyshev polynomials in the position times Chebyshev polynomials in the force.
 
 A tile is a cube. Its coefficients W hold output by output the terms of the outputs that depend on both, and behind them
 those of the joints, which depend on the position alone. A force term of a higher degree goes with position terms of
@@ -19,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from camcomp.ground.compiled import entry, inner
-from camcomp.ground.datatypes import RAPID, Floats, Ints
-from camcomp.model.statics.vectors import cross, dot, part, plus
+from camcomp.ground.datatypes import Floats, Ints
+from camcomp.model.statics.vectors import dot, part
 
 MISSING, SPLIT, EXACT = -3, -1, -2  # what a cell can be besides a tile
 LEVELS = 6
@@ -176,80 +174,6 @@ def contract(W, first, C, n, outputs, out):
         out[0, o], out[1, o], out[2, o], out[3, o] = u0, u1, u2, u3
         out[0, o1], out[1, o1], out[2, o1], out[3, o1] = v0, v1, v2, v3
         out[0, o2], out[1, o2], out[2, o2], out[3, o2] = w0, w1, w2, w3
-
-
-@inner
-def path_force(t, axis, components):
-    """Force (3,) of components (Fr, Ft, Fz) for the unit feed direction t, and the sine of t to the tool axis."""
-    across = plus(t, axis, -dot(t, axis))
-    size = math.sqrt(dot(across, across))
-    if not size > 1e-6:
-        return (0.0, 0.0, 0.0), size
-    x = (across[0] / size, across[1] / size, across[2] / size)
-    right = cross(x, axis)
-    a, b, c = components[0], components[1], components[2]
-    return (
-        a * right[0] + b * x[0] + c * axis[0],
-        a * right[1] + b * x[1] + c * axis[1],
-        a * right[2] + b * x[2] + c * axis[2],
-    ), size
-
-
-@inner
-def set_row(out, i, v):
-    """Fills row i of out (n, 3)."""
-    out[i, 0], out[i, 1], out[i, 2] = v
-
-
-@entry
-def lay_loads(kind, start, end, axis, components, join_cosine, plunge_sine, f0, f1, jump, length):
-    """Forces at the start and the end of moves (n,), where they jump, and the lengths: track.py for constant components.
-
-    A feed move without length keeps the force before it.
-    """
-    before = -1  # the last move that counts
-    axis, components = part(axis, 0), part(components, 0)
-    zero = (0.0, 0.0, 0.0)
-    last = own_before = zero
-    cut_before = False
-    for i in range(kind.shape[0]):
-        jump[i] = False
-        t = plus(part(end[i], 0), part(start[i], 0), -1.0)
-        size = math.sqrt(dot(t, t))
-        length[i] = size
-        if not size > 0.0 and kind[i] != RAPID:
-            for k in range(3):
-                f0[i, k] = f1[before, k] if before >= 0 else 0.0
-                f1[i, k] = f0[i, k]
-            continue
-        own = zero
-        cuts = False
-        if size > 0.0:
-            t = (t[0] / size, t[1] / size, t[2] / size)
-            if kind[i] != RAPID:
-                own, sine = path_force(t, axis, components)
-                cuts = sine > plunge_sine
-        if not cuts:
-            own = zero
-        set_row(f0, i, own)
-        set_row(f1, i, own)
-        if before >= 0:
-            if cuts and cut_before and dot(last, t) >= join_cosine:
-                middle = plus(last, t, 1.0)
-                size = math.sqrt(dot(middle, middle))
-                corner, _ = path_force((middle[0] / size, middle[1] / size, middle[2] / size), axis, components)
-                set_row(f1, before, corner)
-                set_row(f0, i, corner)
-                for j in range(before + 1, i):  # moves without length in between
-                    set_row(f0, j, corner)
-                    set_row(f1, j, corner)
-            else:
-                change = plus(own, own_before, -1.0)
-                jump[i] = math.sqrt(dot(change, change)) > 1e-9
-        before = i
-        last = t
-        own_before = own
-        cut_before = cuts
 
 
 def look_up(

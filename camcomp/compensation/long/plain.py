@@ -8,10 +8,9 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.bands.scatter import best_share, excess
-from camcomp.compensation.long.engagement import RunEngagement
 from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import follow
-from camcomp.compensation.long.loads import Edge, Loads, constant_of, joints_at, loads_of
+from camcomp.compensation.long.loads import Loads, RunContext, joints_at, loads_of
 from camcomp.compensation.long.output_state import OutputState
 from camcomp.compensation.long.plain_run import Middles, NotInPieces, PlainRun, Unsolved
 from camcomp.compensation.long.run_bands import RunUncertainty
@@ -107,36 +106,29 @@ class PlainCorrector:
         self.tolerance = 1e-3 * tolerance_um
         self.field: Field | None = None
         self.exact = 0  # rows that had to be solved one by one
-        self._constant = constant_of(job)
 
-    def correct(
-        self, whole: PlainRun, before: Edge | None, after: Edge | None, carry: OutputState,
-        met: RunEngagement | None = None,
-    ) -> CorrectedRun:  # fmt: skip
-        """The run corrected and written; `carry` is moved along. met: what the tool meets. Raises Unsolved, NotInPieces."""
-        loads = loads_of(run=whole, before=before, after=after, c=self.job.conditions, constant=self._constant, met=met)
+    def correct(self, context: RunContext, carry: OutputState) -> CorrectedRun:
+        """The run corrected and written; `carry` is moved along. Raises Unsolved, NotInPieces."""
+        loads = loads_of(context, self.job)
         try:
-            return self._corrected(whole=whole, met=met, loads=loads, before=before, after=after, carry=carry)
+            return self._corrected(context, loads, carry)
         except Unsolved as error:
-            raise Unsolved(loads.of[error.move], error.target, error.status) from None
+            raise Unsolved(loads.motion[error.move], error.target, error.status) from None
 
-    def _corrected(
-        self, whole: PlainRun, met: RunEngagement | None, loads: Loads, before: Edge | None, after: Edge | None,
-        carry: OutputState,
-    ) -> CorrectedRun:  # fmt: skip
+    def _corrected(self, context: RunContext, loads: Loads, carry: OutputState) -> CorrectedRun:
         run = loads.run
-        uncertainty = RunUncertainty.of(self.job, whole, before, after, met) if self.job.config.uncertain else None
+        uncertainty = RunUncertainty(self.job, context) if self.job.config.uncertain else None
         policy = self.job.config.compensation.policy if uncertainty is not None else "full"
         self._set_up(run, loads)
         if uncertainty is not None and policy == "skip":
             loads = self._left_lines(run, loads, uncertainty)
-        lead, trail = joints_at(loads, run.plain.kind, before, after)
+        lead, trail = joints_at(loads, context.before, context.after)
         tolerance = np.full(run.motions, self.budget)
         hard = (loads.length > EASY_MM) & (run.plain.kind == LINE)
         for left in range(ROUNDS, 0, -1):
             rows = self._rows(run=run, loads=loads, lead=lead, trail=trail, hard=hard, tolerance=tolerance)
             answers = self._answers(rows)
-            commanded, kept, share = self._commanded(rows, answers, loads.of, uncertainty, policy)
+            commanded, kept, share = self._commanded(rows, answers, loads.motion, uncertainty, policy)
             if left == ROUNDS and self._drop_small_joints(rows, commanded, carry, lead, trail):
                 continue
             middles = self._middles(run, loads, rows, share)
@@ -147,7 +139,7 @@ class PlainCorrector:
                 continue
             trial = replace(carry)
             data, written, held, rest = self._write(
-                run=whole, loads=loads, rows=rows, commanded=commanded, kept=kept, carry=trial
+                run=context.run, loads=loads, rows=rows, commanded=commanded, kept=kept, carry=trial
             )
             judged = self._judged(run, rows)
             error = self._after(
@@ -225,7 +217,7 @@ class PlainCorrector:
         answer = self.ask(moves, target, force, every=False)[0]
         there = uncertainty.moves(target + self._back(answer[:, :3]), moves, w, force, np.zeros(len(moves), np.bool_))
         found, behind = excess(self._back(answer[:, 3:6]), there), np.flatnonzero(ends)
-        self._alone = left_alone(np.tile(loads.of, 2), np.concatenate((found[behind - 1], found[behind])))[:n]
+        self._alone = left_alone(np.tile(loads.motion, 2), np.concatenate((found[behind - 1], found[behind])))[:n]
         step = np.concatenate(([True], self._alone[1:] != self._alone[:-1], [True]))
         return replace(loads, jump=loads.jump | step)
 
@@ -257,9 +249,8 @@ class PlainCorrector:
             target[inside] = start + w[inside, None] * (target[inside] - start)
             force[inside] = loads.at(move[inside], w[inside])
         force[kind == 2] = 0.0
-        engagement = None if loads.sizes is None else loads.sizes(move, w)
         return PlainRows(
-            move=move, w=w, joining=kind != 1, target=target, force=force, shift=shift, engagement=engagement
+            move=move, w=w, joining=kind != 1, target=target, force=force, shift=shift, engagement=loads.sizes(move, w)
         )
 
     def _divided(self, run: PlainRun, loads: Loads, which: Ints, tolerance: Floats) -> tuple[Ints, Floats, Floats]:
@@ -428,7 +419,7 @@ class PlainCorrector:
         carry.apart = apart
         own = (mode.apart if apart else mode).said(run.state.unit)
         modes = [np.frombuffer(each.encode(), np.uint8) for each in (self.language.exact_stop, own)]
-        first = np.searchsorted(loads.of[rows.move], np.arange(run.motions + 1))
+        first = np.searchsorted(loads.motion[rows.move], np.arange(run.motions + 1))
         out = np.empty(run.text_end - run.text_at + MAX_ROW_BYTES * (N + 1 + int(rest.sum())), np.uint8)
         written, held = np.empty((N, 3)), np.empty(N)
         position, state = carry.written.copy(), np.array([carry.code, carry.feed])

@@ -10,7 +10,7 @@ import numpy as np
 from camcomp.compensation.long.field import Tiles
 from camcomp.gcode.plain_lines import PlainMotions
 from camcomp.gcode.state import ControlState
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import RAPID, Floats, Ints, Path
 
 
 class NotInPieces(Exception):
@@ -41,6 +41,16 @@ class PlainRun:
     def motions(self) -> int:
         """Number of motions."""
         return len(self.plain.row)
+
+    def path(self) -> Path:
+        """The motions as a path."""
+        plain, n, state = self.plain, self.motions, self.state
+        return Path(
+            line=plain.row + self.row0 + 1, kind=plain.kind, start=plain.start, end=plain.end, centre=np.full((n, 3), np.nan),
+            axis=np.zeros((n, 3)), angle=np.zeros(n), feed=np.where(plain.kind == RAPID, np.nan, plain.feed),
+            speed=np.full(n, state.speed), turn=np.full(n, state.sense), tool=np.full(n, state.tool),
+            known=np.ones(n, np.bool_), machine=np.zeros(n, np.bool_),
+        )  # fmt: skip
 
     def parts(self, of: Ints, start: Floats, end: Floats) -> PlainRun:
         """A run of parts (n,) of these motions, from start (n, 3) to end (n, 3)."""

@@ -10,20 +10,21 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
-from camcomp.compensation.long.engagement import RunEngagement, path_of_run
-from camcomp.compensation.long.loads import Edge
+from camcomp.compensation.long.engagement import RunEngagement
+from camcomp.compensation.long.loads import RunContext
 from camcomp.compensation.long.output_state import OutputState
 from camcomp.compensation.long.plain import PlainCorrector
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun, Unsolved
+from camcomp.compensation.long.proof import Sample
 from camcomp.compensation.long.runs import InterpretedRun, Runs
-from camcomp.compensation.long.totals import Batch, Totals
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.moves import MOST_ERRORS, RULE_OF_STATUS
+from camcomp.compensation.totals import JointRows, Totals
 from camcomp.gcode.output import Part
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.stamp import is_stamped, stamp_index, stamp_text
@@ -55,7 +56,7 @@ class LongProgram:
     tolerance_um: float
     version: str
     arcs: bool | None = None
-    on_rows: Callable[[Batch], None] | None = None
+    on_rows: Callable[[JointRows], None] | None = None
 
     def run(self, source: BinaryIO, sink: Callable[[bytes], object]) -> Totals:
         """Reads the seekable source twice: once for its hash. Raises NotInPieces before or in the middle of writing."""
@@ -71,14 +72,8 @@ class LongProgram:
         self._carry = OutputState(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
         self._told: Future[None] = Future()
         self._told.set_result(None)
-        self.totals = Totals(
-            self.job,
-            self.name,
-            digest.hexdigest(),
-            size,
-            tolerance_um=self.tolerance_um,
-            tabled=self.on_rows is not None,
-        )
+        self.totals = Totals(self.job, self.name, tolerance_um=self.tolerance_um, tabled=self.on_rows is not None)
+        self._sample = Sample(digest.hexdigest(), size)
         self._lines = max(lines, 1)
         self.totals.lines_in = lines
         self._stock = _stock_of(self.job, source, self.name, self.setup)
@@ -94,9 +89,11 @@ class LongProgram:
                 self.totals.lines_out += data.count(b"\n")
                 sink(data)
             self._told.result()
-        self.totals.waiting_s = self._runs.waiting_s(self.job.config)
-        self.totals.finish(self._corrector, self._runs, [] if self._stock is None else self._stock.finish())
-        return self.totals
+        totals = self.totals
+        totals.finish(self._runs, [] if self._stock is None else self._stock.finish())
+        totals.interpolated, iterations = self._sample.proof(self._corrector, totals.points)
+        totals.iterations = max(totals.iterations, iterations)
+        return totals
 
     # --- order ---------------------------------------------------------------------------------------------------
 
@@ -153,10 +150,17 @@ class LongProgram:
     def _plain(self, run: PlainRun, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
         try:
             edges = (before.last if before else None, after.first if after else None)
-            done = self._corrector.correct(run, *edges, self._carry, self._met(piece, before, after))
+            context = RunContext(run, *edges, self._met(piece, before, after))
+            done = self._corrector.correct(context, self._carry)
         except Unsolved as error:
             self._refuse(run, error)
-        self._tell(lambda: self.totals.plain(run, done, self._corrector))
+
+        def tell() -> JointRows:
+            rows = self.totals.add_plain(run, done, self._corrector)
+            self._sample.add(self._corrector, done, rows)
+            return rows
+
+        self._tell(tell)
         return done.data
 
     def _met(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> RunEngagement | None:
@@ -175,7 +179,7 @@ class LongProgram:
         )
         return RunEngagement(piece.engaged, last, first)
 
-    def _tell(self, batch: Callable[[], Batch]) -> None:
+    def _tell(self, batch: Callable[[], JointRows]) -> None:
         """Add up a piece and pass on its rows while the next piece is computed; one piece at a time, in order."""
 
         def tell() -> None:
@@ -231,7 +235,7 @@ class LongProgram:
         own = (result.rows.motion >= part.first) & (result.rows.motion < part.last)
         assert result.written.behind is not None
         self._carry.take(result.written.behind, result.rows.end[np.flatnonzero(own)[-1]])
-        self._tell(lambda: self.totals.odd(result, own, part))
+        self._tell(lambda: self.totals.add_piece(result, own, part))
         return result.written.data[len(head) : len(result.written.data) - len(tail)]
 
 
@@ -260,44 +264,21 @@ class _Piece:
             if not len(real):
                 raise NotInPieces
             self.ends = (int(real[0]), int(real[-1]))
-            state = run.state
-            self.first, self.last = (
-                Edge(
-                    kind=int(plain.kind[k]),
-                    start=plain.start[k],
-                    end=plain.end[k],
-                    feed=float(plain.feed[k]),
-                    speed=state.speed,
-                    turn=state.sense,
-                    tool=state.tool,
-                )
-                for k in self.ends
-            )
+            whole = run.path()
+            self.first, self.last = (whole.take(np.array([k])) for k in self.ends)
             return
         path = self._path = runs.program(run.text, run.row0, run.state).path
         real = np.flatnonzero((path.kind == RAPID) | (path_geometry.lengths(path) > 0.0))
         if not len(real):
             raise NotInPieces
         self.ends = (int(real[0]), int(real[-1]))
-        corrected = path.known & ~path.machine
         edges = []
         for k, u in zip(self.ends, (0.0, 1.0), strict=True):
-            way = NEAR * path_geometry.tangents(path, np.array([k]), np.array([u]))[0]
-            point = path.start[k] if u == 0.0 else path.end[k]
-            kind = RAPID if path.kind[k] == RAPID else LINE
-            edges.append(
-                Edge(
-                    kind=kind,
-                    start=point - (u * way),
-                    end=point + (1.0 - u) * way,
-                    feed=float(path.feed[k]),
-                    speed=float(path.speed[k]),
-                    turn=float(path.turn[k]),
-                    tool=int(path.tool[k]),
-                    corrected=bool(corrected[k]),
-                    machine=bool(path.machine[k]),
-                )
-            )
+            way = NEAR * path_geometry.tangents(path, np.array([k]), np.array([u]))
+            point, each = path.start[k] if u == 0.0 else path.end[k], path.take(np.array([k]))
+            kind = np.where(each.kind == RAPID, RAPID, LINE).astype(np.int8)
+            straight = replace(each, kind=kind, start=point - u * way, end=point + (1.0 - u) * way)
+            edges.append(replace(straight, angle=np.zeros(1), axis=np.zeros((1, 3)), centre=np.full((1, 3), np.nan)))
         self.first, self.last = edges
 
     def path(self) -> Path:
@@ -305,4 +286,4 @@ class _Piece:
         if self._path is not None:
             return self._path
         assert isinstance(self.run, PlainRun)
-        return path_of_run(self.run)
+        return self.run.path()

@@ -18,6 +18,7 @@ from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
 from camcomp.gcode.detect import dialect_of
 from camcomp.gcode.interpret import Interpreter, controller
 from camcomp.gcode.plain_lines import LONGEST_END, MORE, PlainMotions, scan
+from camcomp.gcode.plain_reader import follow, is_plain, motion_number
 from camcomp.gcode.program import Program
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.state import ControlState
@@ -169,32 +170,19 @@ class Runs:
     def _plain(self, limit: int) -> PlainRun | None:
         """The plain lines from here on; None if they contain no motion."""
         state = self._state
-        if (
-            state.relative
-            or state.feed_mode != 94
-            or state.feed_unit != state.unit
-            or not all(state.commanded)
-            or state.motion not in (None, 0, 10)
-        ):
+        if not is_plain(state):
             return None
-        room = PlainMotions.room(limit)
-        code = -1 if state.motion is None else state.motion // 10
-        position, offset = np.array(state.position), np.array(state.offset)
-        pointed = self.language.increments
-        begin = self._at
-        coded, fed = self._flags
+        room, position, begin = PlainMotions.room(limit), np.array(state.position), self._at
         n, rows, at, why, code, feed, coded, fed = scan(
-            self._data, self._at, len(self._data), self._last, code, state.feed or 0.0, coded, fed, position, state.unit, offset,
-            pointed, self.top_mm, room, limit,
+            self._data, begin, len(self._data), self._last, motion_number(state), state.feed or 0.0, *self._flags,
+            position, state.unit, np.array(state.offset), self.language.increments, self.top_mm, room, limit,
         )  # fmt: skip
         if why == MORE and n == 0 and self._more():
             return self._plain(limit)
         if n == 0 or (why == MORE and n < PROBE_MOTIONS and self._more()):
             return self._plain(limit) if n else None
         self._flags = [bool(coded), bool(fed)]
-        state.motion = None if code < 0 else 10 * int(code)
-        state.feed = feed if feed > 0.0 else None
-        state.position = position.tolist()
+        follow(state, code, feed, position)
         self._at = at
         row0, self._row = self._row, self._row + rows
         self.motions += n

@@ -18,6 +18,7 @@ from pydantic import Field
 
 from camcomp.compensation.placing.postures import STATED, start_postures
 from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.totals import Totals
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, progress
 from camcomp.ground.datatypes import RAPID, Path
@@ -151,10 +152,9 @@ class _Judge:
         try:
             program = program_of(self.data, self.name, config)
             done = compensate(program, job, method=settings.method, tolerance_um=settings.tolerance_um, version="")
-            failed = [text for rule, text in done.failed_checks(job, settings.tolerance_um) if rule == "CC602"]
-            from camcomp.compensation.report.tables import summary
-
-            figures = summary(done, job)
+            totals = Totals.of(done, job)
+            failed = [text for rule, text in totals.failed_checks(settings.tolerance_um) if rule == "CC602"]
+            figures = totals.summary()
         except CamcompError as error:
             return Placement.model_validate({**where, **nothing, "why": error.message})
         if failed:

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from camcomp.compensation.bands.outcome import Bands
+from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.arcs_out import Arcs, Bend
 from camcomp.compensation.program.chords import Nodes, second_derivative, trial_nodes
@@ -35,12 +35,12 @@ from camcomp.compensation.program.moves import (
     travel_of,
 )
 from camcomp.compensation.program.orienting import MOST_TILT_RAD, Orienting, refuse_unfollowed
-from camcomp.compensation.program.policy import Shares, shares_of
+from camcomp.compensation.program.policy import shares_of
 from camcomp.compensation.program.posture import check_posture
-from camcomp.compensation.program.program_bands import bands_of
-from camcomp.compensation.program.result import Interpolation, error_size, interpolation_failed, worse_than_before
+from camcomp.compensation.program.result import Interpolation
 from camcomp.compensation.program.reversals import cut_at_reversals
 from camcomp.compensation.program.table_knots import cut_at_knots
+from camcomp.compensation.program.uncertainty import Uncertainty
 from camcomp.compensation.program.under_control import (
     UnderControl,
     rests,
@@ -54,7 +54,6 @@ from camcomp.gcode.uncorrected import below_step_warning
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.progress import part as part_of_work
-from camcomp.ground.source_lines import named_lines
 from camcomp.model.cutting.assumed import ForceDoubts
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
@@ -118,27 +117,6 @@ class Compensated:
         """Source line (N,) of every end point."""
         return self.program.path.line[self.rows.motion]
 
-    def failed_checks(self, job: Job, tolerance_um: float) -> list[tuple[str, str]]:
-        """Rule id and text of every check that the finished program does not pass."""
-        out = []
-        size = 1e3 * np.linalg.norm(self.missed, axis=1)
-        worst = float(np.nanmax(size)) if len(size) else 0.0
-        if not worst <= tolerance_um * (1.0 + 1e-9):
-            out.append(("CC601", f"{worst:.3f} um are left, more than the tolerance of {tolerance_um:g} um"))
-        step = self.program.step_mm(job.config.control.resolution_mm)
-        out += worse_than_before(error_size(self.before).max_um, error_size(self.after).max_um, step)
-        for a, name in enumerate(job.real_machine.actuators):
-            low, high = job.machine.limits[a]
-            value = self.state.rho[:, a]
-            over = np.flatnonzero((value < low) | (value > high))
-            if len(over):
-                unit, k = ("deg", 180.0 / np.pi) if job.machine.revolute[a] else ("mm", 1.0)
-                span = f"{k * low:g} to {k * high:g} {unit}"
-                out.append(
-                    ("CC602", f"actuator {name} leaves its travel {span} at {named_lines(np.unique(self.lines[over]))}")
-                )
-        return out + interpolation_failed(self.interpolated)
-
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
@@ -171,16 +149,16 @@ def compensate(
     because their neighbours depend on them: they are not divided, and their errors do not count. engaged: what the tool
     meets along the path, when the program has been followed through its stock before.
     """
-    wanted = job.config.compensation.arcs if arcs is None else arcs
-    engaged = engaged or job.engaged(program)
-    asked = partial(
-        _compensated, program, job, engaged, method=method, tolerance_um=tolerance_um, version=version, part=part
-    )
-    found = asked(arcs=bool(wanted))
+    asked = job.config.compensation.arcs if arcs is None else arcs
+    correction = _Correction(
+        program=program, job=job, method=method, tolerance_um=tolerance_um, version=version, part=part,
+        engaged=engaged or job.engaged(program),
+    )  # fmt: skip
+    found = correction.done(arcs=bool(asked))
     own = slice(None) if part is None else slice(part.first, part.last)
     able = bool((program.path.kind[own] == ARC).any()) and not job.causes
-    if wanted is None and able and (found.control.leaves_room(tolerance_um) or found.control.apart):
-        other = asked(arcs=True)
+    if asked is None and able and (found.control.leaves_room(tolerance_um) or found.control.apart):
+        other = correction.done(arcs=True)
         as_good = found.control.apart and not other.control.apart  # in the program's own mode
         as_good = as_good and not found.control.better_than(other.control, tolerance_um)
         if as_good or other.control.better_than(found.control, tolerance_um):
@@ -188,247 +166,304 @@ def compensate(
     return found
 
 
-def _compensated(
-    program: Program,
-    job: Job,
-    engaged: Engaged | None,
-    *,
-    method: str,
-    tolerance_um: float,
-    version: str,
-    part: Part | None,
-    arcs: bool,
-) -> Compensated:
-    """The corrected program, its arcs as arcs or as lines."""
-    path, resolution = program.path, program.step_mm(job.config.control.resolution_mm)
-    spacing = _spacing(job)
-    base = lay_track(path, job.conditions, engaged)
-    orienting = Orienting.of(program, job)
-    if orienting is not None:
-        arcs = False  # a circle of the tip does not turn the tool as a correction needs it
-        refuse_unfollowed(job, method, part)
-    turns = load_turns(job, base)
-    track, turning = cut_at_reversals(job, cut_at_knots(job, turns.cut(base), spacing), spacing)
-    shares = shares_of(job, base)
-    if shares is not None:
-        track, of = shares.divided(shares.with_jumps(track))
-        turning = turning[of]
-    pushed = turns.pieces(base, track)
-    turning |= pushed
-    corrected = corrected_pieces(path, track)
-    feeding = corrected & (path.kind[track.motion] != RAPID)
-    if part is not None:
-        feeding &= (track.motion >= part.first) & (track.motion < part.last)
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Division:
+    """Pieces (p,) divided once, written, and put through the full model at judged points (k,)."""
 
-    trial = trial_nodes(track.length, track.angle, feeding & ~turning & (track.length > 0.0), spacing)
-    with part_of_work(0.0, 0.4, points=True):
-        aimed = _aim(
-            program, job, track=track, nodes=trial, corrected=corrected, method=method, shares=shares,
-            orienting=orienting,
-        )  # fmt: skip
-    curve, weight = aimed.commanded, 1e-3 * tolerance_um
-    correction = aimed.commanded - track.points(trial.piece, trial.w)
-    kept = _kept(track, trial, correction, 0.5 * resolution)
-    if orienting is not None:
-        curve = np.column_stack((curve, orienting.lengths(aimed.words, weight)))
-        kept &= orienting.kept(track, trial, aimed.words)
-    second = second_derivative(trial, curve)
-    goal = error_goals(tolerance_um, resolution, _largest(track, trial, np.linalg.norm(correction, axis=1)))
-    budget = chord_budget(goal, resolution)
-    tolerance = budget.copy()
-    if shares is not None:
-        goal *= WITH_SHARES
-    tolerance[kept | turning] = np.inf
-    able = feeding & ~kept & (arcs and not job.causes)  # what drives leave over has waves that no arc follows
-    bend = Bend.of(track=track, trial=trial, commanded=aimed.commanded, second=second, tolerance=tolerance, able=able)
-    rounded = np.maximum(budget - np.sqrt(0.5) * resolution, 0.1 * budget)  # the centre is rounded, too
-    tolerance[bend.use] = rounded[bend.use]
-    last, last_count = np.full(len(tolerance), np.inf), np.zeros(len(tolerance), np.int64)
-    for round_ in range(MAX_ROUNDS):
-        nodes, shift = bend.divided(trial, tolerance)
-        if (gone := bend.pointless(nodes)).any():
-            bend.use &= ~gone
-            tolerance[gone] = budget[gone]
+    rows: CorrectedRows
+    written: Rewritten
+    points: JudgedPoints
+    commanded: Floats  # (k, 3) mm, of the written program
+    after: Seen
+    left: Floats | None  # (k, 3) mm of the error that a policy leaves on purpose
+    worst: Floats  # (p,) mm, largest error beside that
+
+    @property
+    def missed(self) -> Floats:
+        """Errors (k, 3) mm minus those that the policy accepts."""
+        return self.after.error if self.left is None else self.after.error - self.left
+
+
+@dataclass(eq=False, kw_only=True)
+class _Correction:
+    """One program to be corrected: its track of pieces (p,), and the trial points from which they are divided."""
+
+    program: Program
+    job: Job
+    method: str
+    tolerance_um: float
+    version: str
+    part: Part | None
+    engaged: Engaged | None
+
+    def __post_init__(self) -> None:
+        program, job, spacing = self.program, self.job, _spacing(self.job)
+        self.step = program.step_mm(job.config.control.resolution_mm)
+        base = lay_track(program.path, job.conditions, self.engaged)
+        self.orienting = Orienting.of(program, job)
+        if self.orienting is not None:
+            refuse_unfollowed(job, self.method, self.part)
+        self.turns = load_turns(job, base)
+        track, turning = cut_at_reversals(job, cut_at_knots(job, self.turns.cut(base), spacing), spacing)
+        self.shares = shares_of(job, base)
+        if self.shares is not None:
+            track, of = self.shares.divided(self.shares.with_jumps(track))
+            turning = turning[of]
+        self.track, self.pushed = track, self.turns.pieces(base, track)
+        self.corrected = corrected_pieces(program.path, track)
+        self.feeding = self.corrected & (program.path.kind[track.motion] != RAPID)
+        if self.part is not None:
+            self.feeding &= (track.motion >= self.part.first) & (track.motion < self.part.last)
+        self._try(turning | self.pushed, spacing)
+
+    def _try(self, turning: Bools, spacing: float) -> None:
+        """Solve trial points `spacing` mm apart: how the commanded path bends, and which error a piece may keep."""
+        track = self.track
+        self.trial = trial = trial_nodes(
+            track.length, track.angle, self.feeding & ~turning & (track.length > 0.0), spacing
+        )
+        with part_of_work(0.0, 0.4, points=True):
+            self.aimed = self._aim(trial)
+        curve = self.aimed.commanded
+        correction = curve - track.points(trial.piece, trial.w)
+        self.kept = _kept(track, trial, correction, 0.5 * self.step)
+        if self.orienting is not None:
+            lengths = self.orienting.lengths(self.aimed.words, 1e-3 * self.tolerance_um)
+            curve = np.column_stack((curve, lengths))
+            self.kept &= self.orienting.kept(track, trial, self.aimed.words)
+        self.second = second_derivative(trial, curve)
+        most = _largest(track, trial, np.linalg.norm(correction, axis=1))
+        self.goal = error_goals(self.tolerance_um, self.step, most)
+        self.budget = chord_budget(self.goal, self.step)
+        if self.shares is not None:
+            self.goal *= WITH_SHARES
+        self.whole = self.kept | turning  # pieces that are not divided
+
+    def _aim(self, nodes: Nodes) -> _Aimed:
+        """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
+        job, track, orienting, on = self.job, self.track, self.orienting, self.corrected[nodes.piece]
+        piece, w = nodes.piece[on], nodes.w[on]
+        rapids = np.flatnonzero(self.corrected & (track.path.kind[track.motion] == RAPID) & (track.length > 0.0))
+        if not job.causes:
+            rapids = rapids[:0]
+        between, at = np.repeat(rapids, len(WITHIN_RAPID)), np.tile(WITHIN_RAPID, len(rapids))
+        order = np.lexsort((np.concatenate((w, at)), np.concatenate((piece, between))))  # drives remember their turns
+        asked = np.argsort(order, kind="stable")[: len(piece)]
+        piece, w = np.concatenate((piece, between))[order], np.concatenate((w, at))[order]
+        target, travel = track.points(piece, w), travel_of(job, track, piece, w)
+        words = np.zeros((len(nodes.piece), 3))
+        if orienting is None:
+            result = aim_at(job, target, travel, self.method)
+        else:
+            words = orienting.programmed(track, nodes.piece, nodes.w)
+            result, turned = orienting.aim(target, travel, orienting.programmed(track, piece, w))
+            words[on] = turned[asked]
+        refuse_unsolved(self.program, track, piece, target, result.status)
+        out = track.points(nodes.piece, nodes.w)
+        out[on] = result.commanded[asked]
+        if self.shares is not None:
+            out = self.shares.taken(track, nodes.piece, nodes.w, track.points(nodes.piece, nodes.w), out)
+        return _Aimed(out, int(result.iterations[asked].max(initial=0)), words)
+
+    # --- division ------------------------------------------------------------------------------------------------
+
+    def _divided(self, arcs: bool) -> _Division:
+        """Divide finer and finer, until the written program keeps its goals or a finer division is no use."""
+        trial, budget, goal = self.trial, self.budget, self.goal
+        bend, tolerance = self._bend(arcs)
+        last, last_count = np.full(len(tolerance), np.inf), np.zeros(len(tolerance), np.int64)
+        for round_ in range(MAX_ROUNDS):
             nodes, shift = bend.divided(trial, tolerance)
-        with part_of_work(1.0 - 0.6 * 0.5**round_, 1.0 - 0.35 * 0.5**round_, points=True):
-            commanded, circles, words = _bent(
-                program, job, track=track, nodes=nodes, shift=shift, corrected=corrected, method=method, bend=bend,
-                shares=shares, orienting=orienting,
+            if (gone := bend.pointless(nodes)).any():
+                bend.use &= ~gone
+                tolerance[gone] = budget[gone]
+                nodes, shift = bend.divided(trial, tolerance)
+            with part_of_work(1.0 - 0.6 * 0.5**round_, 1.0 - 0.35 * 0.5**round_, points=True):
+                commanded, circles, words = self._bent(nodes, shift, bend)
+            found = self._written(nodes, commanded, circles, words)
+            missed = (found.worst > goal) & ~self.kept
+            count = np.diff(nodes.first)
+            stuck = missed & (found.worst >= STUCK * last) & (count > last_count)
+            straighten = missed & bend.use & (stuck | (round_ >= ARC_ROUNDS - 1))
+            missed &= ~stuck & ~straighten
+            if not (missed | straighten).any():
+                break
+            last, last_count = np.where(straighten, np.inf, found.worst), count
+            bend.use &= ~straighten
+            tolerance[straighten] = budget[straighten]
+            finer = tolerance * np.clip(0.9 * goal / np.maximum(found.worst, 1e-12), 0.3, 0.9)
+            tolerance = np.where(missed, finer, tolerance)
+        return found
+
+    def _bend(self, arcs: bool) -> tuple[Bend, Floats]:
+        """What pieces are divided for, and chords' tolerances (p,) mm."""
+        tolerance, step = self.budget.copy(), self.step
+        tolerance[self.whole] = np.inf
+        able = self.feeding & ~self.kept & (arcs and not self.job.causes)  # no arc follows waves that drives leave over
+        bend = Bend.of(
+            track=self.track, trial=self.trial, commanded=self.aimed.commanded, second=self.second,
+            tolerance=tolerance, able=able,
+        )  # fmt: skip
+        rounded = np.maximum(self.budget - np.sqrt(0.5) * step, 0.1 * self.budget)  # the centre is rounded, too
+        tolerance[bend.use] = rounded[bend.use]
+        return bend, tolerance
+
+    def _bent(self, nodes: Nodes, shift: Floats, bend: Bend) -> tuple[Floats, Arcs, Floats | None]:
+        """Commanded tips (k, 3) at nodes, the circles of the moves that lead there as arcs, and the words (k, 3) of the
+        orientation there. Turns off what cannot bend.
+        """
+        track = self.track
+        both, middle = arcs_out.middles(nodes, bend.use)
+        aimed = self._aim(both)
+        solved = aimed.commanded
+        commanded = solved[~middle] + shift[:, :3]
+        circles = Arcs.none(len(commanded))
+        to = np.flatnonzero((np.diff(nodes.piece, prepend=-1) == 0) & bend.use[nodes.piece])
+        if len(to):
+            motion = track.motion[nodes.piece[to]]
+            found, wrong = arcs_out.through(
+                start=commanded[to - 1], middle=solved[middle], end=commanded[to], axis=track.path.axis[motion],
+                way=track.path.angle[motion], flat=arcs_out.FLATTEST * self.step,
             )  # fmt: skip
-        if orienting is not None:
-            words = words + orienting.from_lengths(shift[:, 3:], weight)
+            circles.centre[to], circles.angle[to] = found.centre, found.angle
+            bend.use[nodes.piece[to[wrong]]] = False
+        if self.orienting is None:
+            return commanded, circles, None
+        turned = self.orienting.from_lengths(shift[:, 3:], 1e-3 * self.tolerance_um)
+        return commanded, circles, aimed.words[~middle] + turned
+
+    def _written(self, nodes: Nodes, commanded: Floats, circles: Arcs, words: Floats | None) -> _Division:
+        """The program written with commanded tips (k, 3) at nodes, and seen by the full model."""
+        job, track, part = self.job, self.track, self.part
         rows = corrected_rows(
-            program, job, track=track, nodes=nodes, commanded=commanded, kept=kept, circles=circles,
-            begins=part is None or part.first == 0, shares=shares, orienting=orienting,
-            words=None if orienting is None else words,
+            self.program, job, track=track, nodes=nodes, commanded=commanded, kept=self.kept, circles=circles,
+            begins=part is None or part.first == 0, shares=self.shares, orienting=self.orienting, words=words,
         )  # fmt: skip
-        written = rewrite(
-            program, output_of(path, rows), resolution_mm=job.config.control.resolution_mm, version=version,
-            part=part, model=job.fingerprint,
-        )  # fmt: skip
-        points = judged_points(job, track, rows, feeding & ~pushed)
-        after = see(
-            job=job, points=points, ends=written.end, arcs=replace(rows.arcs, centre=written.centre),
-            orienting=orienting, words=written.words,
-        )  # fmt: skip
-        left = None
-        if shares is not None:
-            left = shares.left(job, track, points.piece, points.w, travel=points.travel, before=points.before)
-        worst = np.zeros(len(tolerance))
-        missed_by = after.error if left is None else after.error - left
-        size = np.where(after.status == 0, np.linalg.norm(missed_by, axis=1), np.inf)
+        written = self._rewritten(rows)
+        points = judged_points(job, track, rows, self.feeding & ~self.pushed)
+        told = points.along(written.end, replace(rows.arcs, centre=written.centre))
+        after, left = see(job, points, told, self.orienting, written.words), None
+        if self.shares is not None:
+            left = self.shares.left(job, track, points.piece, points.w, travel=points.travel, before=points.before)
+        missed = after.error if left is None else after.error - left
+        size = np.where(after.status == 0, np.linalg.norm(missed, axis=1), np.inf)
         if after.tilt is not None:
-            size = np.maximum(size, np.nan_to_num(after.tilt) * goal[points.piece] / MOST_TILT_RAD)
+            size = np.maximum(size, np.nan_to_num(after.tilt) * self.goal[points.piece] / MOST_TILT_RAD)
+        worst = np.zeros(len(self.goal))
         np.maximum.at(worst, points.piece[points.judged], size[points.judged])
-        missed = (worst > goal) & ~kept
-        count = np.diff(nodes.first)
-        stuck = missed & (worst >= STUCK * last) & (count > last_count)
-        straighten = missed & bend.use & (stuck | (round_ >= ARC_ROUNDS - 1))
-        missed &= ~stuck & ~straighten
-        if not (missed | straighten).any():
-            break
-        last, last_count = np.where(straighten, np.inf, worst), count
-        bend.use &= ~straighten
-        tolerance[straighten] = budget[straighten]
-        tolerance = np.where(missed, tolerance * np.clip(0.9 * goal / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance)
-    with part_of_work(0.8, 1.0, points=True):
-        before = see_original(job, points)
-    for seen in (after, before):
-        judged = points.judged
-        refuse_unsolved(program, track, points.piece[judged], points.target[judged], seen.status[judged])
-    still = np.intersect1d(cut_without_spindle(track), path.line[track.motion[feeding]])
-    rest = rests(program, rows, tolerance_um, part)
-    if rest.any():
-        written = rewrite(
-            program, output_of(path, rows, rest), resolution_mm=job.config.control.resolution_mm, version=version,
-            part=part, model=job.fingerprint,
+        return _Division(rows=rows, written=written, points=points, commanded=told, after=after, left=left, worst=worst)
+
+    def _rewritten(self, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Rewritten:
+        return rewrite(
+            self.program, output_of(self.program.path, rows, rest, apart), part=self.part, version=self.version,
+            resolution_mm=self.job.config.control.resolution_mm, model=self.job.fingerprint,
         )  # fmt: skip
-    seen = replace(after, error=missed_by)
-    control = under_control(program, job, rows=rows, written=written, points=points, after=seen, rest=rest)
-    if part is None and control.stated and 1e3 * control.off_joins > tolerance_um * (1.0 + 1e-9):
-        apart = stays_apart(program, rows)
-        if apart.any():
-            other = under_control(
-                program, job, rows=rows, written=written, points=points, after=seen, rest=rest, apart=apart
-            )
-            if other.better_than(control, tolerance_um):
-                control = other
-                written = rewrite(
-                    program, output_of(path, rows, rest, apart), resolution_mm=job.config.control.resolution_mm,
-                    version=version, model=job.fingerprint,
-                )  # fmt: skip
-    lines = path.line[track.motion[points.piece[points.judged]]]
-    warnings = _warm_up(job) + control.warnings(lines, tolerance_um, program.language)
-    warnings += [*turns.warning(), *spindle_warning(still)]
-    if part is None:
-        doubts = ForceDoubts(config=job.config)
-        doubts.add(path)
-        warnings += [*job.taken.remarks, *doubts.warnings()]
-        warnings += stock_warnings(stock_remarks(job.config, path, track.engaged))
-        if feeding.any() and kept[feeding].all():
-            feeds = len(np.unique(track.motion[feeding]))
-            warnings.append(below_step_warning(program.name, feeds, resolution))
-    iterations = int(aimed.iterations.max(initial=0))
-    done = _assemble(
-        program, job, track=track, rows=rows, written=written, points=points, before=before, after=after,
-        control=control, iterations=iterations, method=method, still=still, warnings=warnings,
-    )  # fmt: skip
-    told = points.along(written.end, replace(rows.arcs, centre=written.centre))
-    share = None if shares is None else shares.of_ends(track, rows.piece, rows.w, rows.joining)
-    as_told = replace(points, travel=commanded_travel(points, orienting, written.words))
-    bands = bands_of(job, track, rows=rows, points=as_told, told=told, before=before, after=after, share=share)
-    return replace(
-        done, bands=bands, left=None if left is None else left[points.judged], orienting=orienting,
-        tilt_after=None if after.tilt is None else after.tilt[points.judged], fraction=track.u(rows.piece, rows.w),
-    )  # fmt: skip
+
+    # --- the finished program ------------------------------------------------------------------------------------
+
+    def done(self, arcs: bool) -> Compensated:
+        """The corrected program, its arcs as arcs or as lines."""
+        program, job, track = self.program, self.job, self.track
+        found = self._divided(arcs and self.orienting is None)  # a circle of the tip does not turn the tool as needed
+        rows, points, after, judged = found.rows, found.points, found.after, found.points.judged
+        with part_of_work(0.8, 1.0, points=True):
+            before = see_original(job, points)
+        for seen in (after, before):
+            refuse_unsolved(program, track, points.piece[judged], points.target[judged], seen.status[judged])
+        still = np.intersect1d(cut_without_spindle(track), program.path.line[track.motion[self.feeding]])
+        written, control = self._controlled(found)
+        warnings = [*program.warnings, *self._warnings(found, control, still)]
+        line, nominal = program.path.line[rows.motion], before.state.rho_nominal
+        warnings += check_posture(program, job, line, job.frame.to_machine(rows.target), nominal)
+        state = after.state
+        if self.method != "linear" and rows.words is None:  # words of orientation say what the control makes of them
+            state = whole_pose(job, points, found.commanded, rows.corrected, state)
+        s = track.s0[rows.piece] + rows.w * track.length[rows.piece]
+        return Compensated(
+            program=program, written=written, rows=rows, s=s, t=_times(job, program, rows, s), nominal=nominal, state=state,
+            force=acting_force(job, state.rho, points.travel.take(points.end)), uncorrected=before.tip,
+            before=before.error[judged], after=after.error[judged], control=control, judged=points.row[judged],
+            iterations=self.aimed.iterations, method=self.method, without_spindle=still, warnings=warnings,
+            bands=self._bands(found, before, written), left=None if found.left is None else found.left[judged],
+            orienting=self.orienting, tilt_after=None if after.tilt is None else after.tilt[judged],
+            fraction=track.u(rows.piece, rows.w),
+        )  # fmt: skip
+
+    def _controlled(self, found: _Division) -> tuple[Rewritten, UnderControl]:
+        """The program with the stops and path modes that its controller needs, and what that makes of it."""
+        rows, rest = found.rows, rests(self.program, found.rows, self.tolerance_um, self.part)
+        written = self._rewritten(rows, rest) if rest.any() else found.written
+        planned = partial(
+            under_control, self.program, self.job, rows=rows, written=written, points=found.points,
+            told=found.commanded, missed=found.missed, rest=rest,
+        )  # fmt: skip
+        control = planned()
+        if self.part is None and control.stated and 1e3 * control.off_joins > self.tolerance_um * (1.0 + 1e-9):
+            apart = stays_apart(self.program, rows)
+            if apart.any() and (other := planned(apart=apart)).better_than(control, self.tolerance_um):
+                return self._rewritten(rows, rest, apart), other
+        return written, control
+
+    def _warnings(self, found: _Division, control: UnderControl, still: Ints) -> list[str]:
+        program, job, track, points = self.program, self.job, self.track, found.points
+        lines = program.path.line[track.motion[points.piece[points.judged]]]
+        out = _warm_up(job) + control.warnings(lines, self.tolerance_um, program.language)
+        out += [*self.turns.warning(), *spindle_warning(still)]
+        if self.part is None:
+            doubts = ForceDoubts(config=job.config)
+            doubts.add(program.path)
+            out += [*job.taken.remarks, *doubts.warnings()]
+            out += stock_warnings(stock_remarks(job.config, program.path, track.engaged))
+            if self.feeding.any() and self.kept[self.feeding].all():
+                feeds = len(np.unique(track.motion[self.feeding]))
+                out.append(below_step_warning(program.name, feeds, self.step))
+        return out
+
+    def _bands(self, found: _Division, before: Seen, written: Rewritten) -> Bands | None:
+        """Bands of the end points; None where every number of the config is exact."""
+        job, rows, points = self.job, found.rows, found.points
+        if not job.config.uncertain:
+            return None
+        uncertainty = Uncertainty(job, self.track)
+        at = np.arange(len(points.row)) if job.causes else np.flatnonzero(points.end)
+        free = (rows.joining & (rows.w > 0.0))[points.row]
+        travel = commanded_travel(points, self.orienting, written.words)
+        moves = uncertainty.moves(
+            points.piece[at], points.w[at], commanded=found.commanded[at], travel=travel.take(at), free=free[at],
+            base=(found.after.error + points.target)[at], before=points.before,
+        )  # fmt: skip
+        ends, counted = moves.take(np.flatnonzero(points.end[at])), np.flatnonzero(points.judged)
+        share = np.ones(len(rows.w))
+        if self.shares is not None:
+            share = self.shares.of_ends(self.track, rows.piece, rows.w, rows.joining)
+        totals, row = BandTotals(uncertainty.inputs), points.row[counted]
+        totals.add(found.after.error[counted], ends.take(row), share[row])
+        return Bands(
+            before=before.error[points.end], after=found.after.error[points.end], moves=ends, share=share,
+            known=rows.corrected, totals=totals,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Aimed:
+    commanded: Floats  # (k, 3) program frame
+    iterations: int
+    words: Floats  # (k, 3) of the orientation, zero where the program states none
+
+
+def _times(job: Job, program: Program, rows: CorrectedRows, s: Floats) -> Floats:
+    """Time (N,) s at end points by the programmed feed, s (N,) mm along the path; rapids take none."""
+    feed = program.path.feed[rows.motion]
+    speed = np.where(np.isnan(feed), job.config.process.feed_mm_per_min or np.nan, feed)
+    moving = (rows.kind != RAPID) & (speed > 0.0)
+    out: Floats = np.cumsum(np.where(moving, np.diff(s, prepend=0.0) / np.where(moving, speed, 1.0) * 60.0, 0.0))
+    return out
 
 
 def _spacing(job: Job) -> float:
     """Distance of trial points, mm: a screw's error has waves of a few mm, the scale of an encoder shorter ones."""
     waves = [SHARE_OF_WAVE * each for each in (cause.values.get("pitch_mm", 0.0) for cause in job.causes) if each > 0.0]
     return min([FINE_MM, *waves]) if job.causes else COARSE_MM
-
-
-@dataclass(frozen=True, eq=False)
-class _Aimed:
-    commanded: Floats  # (k, 3) program frame
-    iterations: Ints
-    words: Floats  # (k, 3) of the orientation, zero where the program states none
-
-
-def _aim(
-    program: Program,
-    job: Job,
-    *,
-    track: Track,
-    nodes: Nodes,
-    corrected: Bools,
-    method: str,
-    shares: Shares | None,
-    orienting: Orienting | None = None,
-) -> _Aimed:
-    """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
-    on = corrected[nodes.piece]
-    piece, w = nodes.piece[on], nodes.w[on]
-    rapids = np.flatnonzero(corrected & (track.path.kind[track.motion] == RAPID) & (track.length > 0.0))
-    if not job.causes:
-        rapids = rapids[:0]
-    between = np.repeat(rapids, len(WITHIN_RAPID))  # drives remember where they turned round
-    order = np.lexsort((np.concatenate((w, np.tile(WITHIN_RAPID, len(rapids)))), np.concatenate((piece, between))))
-    asked = np.argsort(order, kind="stable")[: len(piece)]
-    piece, w = np.concatenate((piece, between))[order], np.concatenate((w, np.tile(WITHIN_RAPID, len(rapids))))[order]
-    target = track.points(piece, w)
-    words = np.zeros((len(nodes.piece), 3))
-    if orienting is None:
-        result = aim_at(job, target, travel_of(job, track, piece, w), method)
-    else:
-        words = orienting.programmed(track, nodes.piece, nodes.w)
-        result, turned = orienting.aim(target, travel_of(job, track, piece, w), orienting.programmed(track, piece, w))
-        words[on] = turned[asked]
-    refuse_unsolved(program, track, piece, target, result.status)
-    out = track.points(nodes.piece, nodes.w)
-    out[on] = result.commanded[asked]
-    if shares is not None:
-        out = shares.taken(track, nodes.piece, nodes.w, track.points(nodes.piece, nodes.w), out)
-    iterations = np.zeros(len(out), np.int64)
-    iterations[on] = result.iterations[asked]
-    return _Aimed(out, iterations, words)
-
-
-def _bent(
-    program: Program,
-    job: Job,
-    *,
-    track: Track,
-    nodes: Nodes,
-    shift: Floats,
-    corrected: Bools,
-    method: str,
-    bend: Bend,
-    shares: Shares | None,
-    orienting: Orienting | None = None,
-) -> tuple[Floats, Arcs, Floats]:
-    """Commanded tips (k, 3) at nodes, the circles of the moves that lead there as arcs, and the words (k, 3) of the
-    orientation there. Turns off what cannot bend.
-    """
-    both, middle = arcs_out.middles(nodes, bend.use)
-    aimed = _aim(
-        program, job, track=track, nodes=both, corrected=corrected, method=method, shares=shares, orienting=orienting
-    )
-    solved = aimed.commanded
-    commanded = solved[~middle] + shift[:, :3]
-    circles = Arcs.none(len(commanded))
-    to = np.flatnonzero((np.diff(nodes.piece, prepend=-1) == 0) & bend.use[nodes.piece])
-    if len(to):
-        motion = track.motion[nodes.piece[to]]
-        flat = arcs_out.FLATTEST * program.step_mm(job.config.control.resolution_mm)
-        found, wrong = arcs_out.through(
-            start=commanded[to - 1], middle=solved[middle], end=commanded[to], axis=track.path.axis[motion],
-            way=track.path.angle[motion], flat=flat,
-        )  # fmt: skip
-        circles.centre[to], circles.angle[to] = found.centre, found.angle
-        bend.use[nodes.piece[to[wrong]]] = False
-    return commanded, circles, aimed.words[~middle]
 
 
 def _largest(track: Track, nodes: Nodes, size: Floats) -> Floats:
@@ -451,43 +486,3 @@ def _warm_up(job: Job) -> list[str]:
         return []
     warm = dict.fromkeys(cause.name for cause in job.causes if getattr(cause.effect, "WARMS", False))
     return [f"{name}: without process: temperature_C the machine counts as warming up from 20 deg C" for name in warm]
-
-
-def _assemble(
-    program: Program,
-    job: Job,
-    *,
-    track: Track,
-    rows: CorrectedRows,
-    written: Rewritten,
-    points: JudgedPoints,
-    before: Seen,
-    after: Seen,
-    control: UnderControl,
-    iterations: int,
-    method: str,
-    still: Ints,
-    warnings: list[str],
-) -> Compensated:
-    s = track.s0[rows.piece] + rows.w * track.length[rows.piece]
-    feed = program.path.feed[rows.motion]
-    default = job.config.process.feed_mm_per_min or np.nan
-    speed = np.where(np.isnan(feed), default, feed)
-    step = np.diff(s, prepend=0.0)
-    moving = (rows.kind != RAPID) & (speed > 0.0)
-    t = np.cumsum(np.where(moving, step / np.where(moving, speed, 1.0) * 60.0, 0.0))
-    nominal = before.state.rho_nominal
-    target = job.frame.to_machine(rows.target)
-    warnings = [*program.warnings, *warnings]
-    warnings += check_posture(program, job, program.path.line[rows.motion], target, nominal)
-    state = after.state
-    if method != "linear" and rows.words is None:  # words of orientation say what the control makes of them
-        told = points.along(written.end, replace(rows.arcs, centre=written.centre))
-        state = whole_pose(job, points, told, rows.corrected, state)
-    force = acting_force(job, state.rho, points.travel.take(points.end))
-    return Compensated(
-        program=program, written=written, rows=rows, s=s, t=t, nominal=nominal, state=state, force=force,
-        uncorrected=before.tip, before=before.error[points.judged], after=after.error[points.judged], control=control,
-        judged=points.row[points.judged], iterations=iterations, method=method, without_spindle=still,
-        warnings=warnings,
-    )  # fmt: skip

@@ -91,24 +91,17 @@ class Seen:
     status: Ints
     tip: Floats
     state: Correction
-    tilt: Floats | None = (
-        None  # (k,) rad of the loaded platform against the programmed orientation; None: not looked at
-    )
+    tilt: Floats | None = None  # (k,) rad of the loaded platform against the programmed orientation, where looked at
 
 
 def see(
-    job: Job, points: JudgedPoints, ends: Floats, arcs: Arcs, orienting: Orienting | None = None, words: Floats | None = None
-) -> Seen:  # fmt: skip
-    """The loaded machine along the moves between commanded end points (N, 3), program frame.
-
-    words (N, 3): of the orientation there.
-    """
-    told = points.along(ends, arcs)
+    job: Job, points: JudgedPoints, told: Floats, orienting: Orienting | None = None, words: Floats | None = None
+) -> Seen:
+    """The loaded machine at commanded points (k, 3) mm, program frame; words (N, 3): of the orientation at end points."""
     if orienting is not None and words is not None:
         return _see_oriented(job, points, told, orienting, words)
     tip, state = respond(job, told, points.travel, points.target, before=points.before)
-    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
-    return Seen(tip - points.target, state.status, tip[points.end], Correction(**at))
+    return _seen(points, tip, state)
 
 
 def commanded_travel(points: JudgedPoints, orienting: Orienting | None, words: Floats | None) -> Travel:
@@ -126,7 +119,10 @@ def _see_oriented(job: Job, points: JudgedPoints, told: Floats, orienting: Orien
     wanted = points.travel.rotation
     if wanted is None:
         wanted = np.broadcast_to(job.machine.nominal.held_rotation, (len(row), 3, 3))
-    tilt = orienting.tilt(travel.rotation, state, wanted)
+    return _seen(points, tip, state, orienting.tilt(travel.rotation, state, wanted))
+
+
+def _seen(points: JudgedPoints, tip: Floats, state: Correction, tilt: Floats | None = None) -> Seen:
     at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
     return Seen(tip - points.target, state.status, tip[points.end], Correction(**at), tilt)
 
@@ -134,8 +130,7 @@ def _see_oriented(job: Job, points: JudgedPoints, told: Floats, orienting: Orien
 def see_original(job: Job, points: JudgedPoints) -> Seen:
     """The original program through the full model, at the same points."""
     tip, state = respond(job, points.target, points.travel, before=points.before)
-    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
-    return Seen(tip - points.target, state.status, tip[points.end], Correction(**at))
+    return _seen(points, tip, state)
 
 
 def whole_pose(job: Job, points: JudgedPoints, commanded: Floats, on: Bools, state: Correction) -> Correction:

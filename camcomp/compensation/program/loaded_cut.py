@@ -16,6 +16,7 @@ from camcomp.compensation.program.moves import refuse_unsolved, travel_of
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
+from camcomp.ground.errors import ConfigError
 from camcomp.ground.progress import done, part
 from camcomp.model.cutting.frame import lateral
 from camcomp.model.cutting.track import PLUNGE_SINE, Track, lay_track
@@ -24,6 +25,7 @@ from camcomp.model.motion.response import respond
 from camcomp.model.stock.from_config import Bounds, memory_of
 from camcomp.model.stock.legs import SAGITTA_MM
 from camcomp.model.stock.memory import StockMemory
+from camcomp.model.stock.surface import Surface, surface_of
 from camcomp.model.stock.tool_frame import tool_frame_of
 
 STEP_MM = 0.25  # between nodes
@@ -80,6 +82,17 @@ def loaded_cut(job: Job, program: Program, step_mm: float = STEP_MM) -> LoadedCu
             break
         free = free + off
     return LoadedCut(memory, unrest)
+
+
+def cut_surface(job: Job, program: Program) -> Surface:
+    """Surface that a program cuts as written on the loaded machine, effects included.
+
+    Raises ConfigError CC298 without a stock, PhysicsError where the machine cannot be.
+    """
+    if job.config.workpiece.stock is None:
+        message = "there is no stock that could be cut"
+        raise ConfigError("CC298", message, at=job.config.at("workpiece"), hint="add workpiece: stock")
+    return surface_of(loaded_cut(job, program).memory)
 
 
 def meant_cut(job: Job, program: Program) -> StockMemory:

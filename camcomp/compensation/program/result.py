@@ -22,13 +22,29 @@ class ErrorSize(Result):
     max_um: Size
 
 
+class ErrorSum:
+    """Sum of squares, count and largest size of errors."""
+
+    def __init__(self) -> None:
+        self.most_um, self._squares, self._count = 0.0, 0.0, 0
+
+    def add(self, error: Floats) -> None:
+        """Add errors (k, 3) mm; NaN rows are ignored."""
+        size = 1e3 * np.linalg.norm(error, axis=1)
+        size = size[np.isfinite(size)]
+        self._squares, self._count = self._squares + float(np.sum(size**2)), self._count + len(size)
+        self.most_um = max(self.most_um, float(size.max(initial=0.0)))
+
+    def figures(self) -> ErrorSize:
+        """RMS and largest size."""
+        return ErrorSize(rms_um=float(np.sqrt(self._squares / max(self._count, 1))), max_um=self.most_um)
+
+
 def error_size(error: Floats) -> ErrorSize:
     """RMS and largest size of errors (k, 3) mm, in µm; NaN rows are ignored."""
-    size = np.linalg.norm(error, axis=1)
-    size = 1e3 * size[np.isfinite(size)]
-    if not len(size):
-        return ErrorSize(rms_um=0.0, max_um=0.0)
-    return ErrorSize(rms_um=float(np.sqrt(np.mean(size**2))), max_um=float(size.max()))
+    out = ErrorSum()
+    out.add(error)
+    return out.figures()
 
 
 def worse_than_before(before_um: float, after_um: float, step_mm: float) -> list[tuple[str, str]]:

@@ -50,14 +50,11 @@ class Uncertainty:
         """
         if self.job.causes or travel.rotation is not None:
             return self._anew(piece, w, commanded=commanded, travel=travel, free=free, base=base, before=before)
-        moves, compliance = self._field.at(commanded, travel.force)
-        for j, each in enumerate(self.inputs):
-            if each.moves_force:
-                forces = [self._force(one, piece, w, free) - travel.force for one in each.sides]
-                slope, bend = of_sides(each, np.zeros_like(commanded), forces)
-                moves.slope[:, :, j] += np.einsum("nij,nj->ni", compliance, slope)
-                moves.bend[:, :, j] += np.einsum("nij,nj->ni", compliance, bend)
-        return moves
+        changes = [
+            [self._force(one, piece, w, free) - travel.force for one in each.sides] if each.moves_force else []
+            for each in self.inputs
+        ]
+        return self._field.moves(commanded, travel.force, changes)
 
     def _anew(
         self,

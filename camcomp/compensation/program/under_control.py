@@ -28,7 +28,7 @@ from camcomp.model.trajectory.plan import ControlPlan, plan_of
 
 if TYPE_CHECKING:
     from camcomp.compensation.program.corrected_rows import CorrectedRows
-    from camcomp.compensation.program.judged_points import JudgedPoints, Seen
+    from camcomp.compensation.program.judged_points import JudgedPoints
 
 LOST_TIME = 1.02  # factor of the cycle time from which a faster way is looked for
 
@@ -198,11 +198,15 @@ def under_control(
     rows: CorrectedRows,
     written: Rewritten,
     points: JudgedPoints,
-    after: Seen,
+    told: Floats,
+    missed: Floats,
     rest: Bools,
     apart: Bools | None = None,
 ) -> UnderControl:
-    """Plan a corrected program as its controller does. rest, apart (N,): forced stops, lines that are not merged."""
+    """Plan a corrected program as its controller does.
+
+    told, missed (k, 3) mm: written program and its tip errors at the points. rest, apart (N,): forced stops, unmerged lines.
+    """
     path, limits = program.path, limits_of(job.config)
     default = job.config.process.feed_mm_per_min or np.nan
     feed = np.where(np.isnan(path.feed), default, path.feed)
@@ -213,12 +217,11 @@ def under_control(
         moves = replace(moves, merge=np.where(apart, 0.0, moves.merge))
     plan = plan_of(moves, limits)
     judged = np.flatnonzero(points.judged)
-    told = points.along(written.end, arcs_out.Arcs(written.centre, rows.arcs.angle))[judged]
-    row = points.row[judged]
+    told, row = told[judged], points.row[judged]
     joining = np.concatenate((rows.joining, [False]))
     beside = joining[row - 1] | joining[row + 1]
     cuts = np.flatnonzero((path.kind != RAPID) & ~path.machine)
-    error = after.error[judged] + plan.leaves_by(row, told)
+    error = missed[judged] + plan.leaves_by(row, told)
     return UnderControl(
         before_s=before.duration_s, after_s=plan.duration_s, modes=distinct(program.modes[k] for k in cuts),
         error=error, joined=beside, row=row, told=told, rest=rest, apart=apart is not None,
@@ -266,7 +269,9 @@ def written_moves(program: Program, rows: CorrectedRows, written: Rewritten, fee
     )  # fmt: skip
 
 
-def of_text(original: Program, corrected: Program, job: Job, move: Ints, told: Floats, error: Floats) -> dict[str, Any]:
+def of_text(
+    original: Program, corrected: Program, job: Job, move: Ints, *, told: Floats, error: Floats
+) -> dict[str, Any]:
     """The figures of a verification that the control adds.
 
     error (k, 3) mm: what the text of the corrected program leaves at points told (k, 3) mm on its moves (k,).

@@ -8,10 +8,10 @@ from typing import BinaryIO, Protocol
 
 import numpy as np
 
-from camcomp.compensation.long.totals import Batch
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.report.parquet import SUFFIX, ParquetTable
-from camcomp.compensation.report.tables import decimals_of, joint_columns, joint_csv, values_behind
+from camcomp.compensation.report.tables import decimals_of, joint_columns
+from camcomp.compensation.totals import JointRows, Totals
 from camcomp.gcode.plain_rows import csv_rows
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.job import Job
@@ -29,13 +29,12 @@ class JointTable:
     def __init__(self, sink: _Sink) -> None:
         self._sink = sink
 
-    def batch(self, batch: Batch) -> None:
+    def add(self, rows: JointRows) -> None:
         """Adds rows."""
-        m = batch.nominal.shape[1]
-        actuators = np.stack((batch.nominal, batch.joints, batch.drive), axis=2).reshape(-1, 3 * m)
-        behind = [] if batch.behind is None else [batch.behind]
-        values = np.column_stack((batch.s, batch.t, batch.target, batch.written, batch.force, actuators, *behind))
-        self._sink.rows(batch.line, values)
+        actuators = np.stack((rows.nominal, rows.joints, rows.drive), axis=2).reshape(len(rows.line), -1)
+        behind = [] if rows.behind is None else [rows.behind]
+        values = np.column_stack((rows.s, rows.t, rows.target, rows.written, rows.force, actuators, *behind))
+        self._sink.rows(rows.line, values)
 
     def close(self) -> None:
         """Writes the end."""
@@ -63,24 +62,8 @@ def joint_table(file: BinaryIO, name: str, job: Job, oriented: bool = False) -> 
 
 def joint_bytes(result: Compensated, job: Job, name: str) -> bytes:
     """The joint table of a program that was corrected as a whole."""
-    if not name.endswith(SUFFIX):
-        return joint_csv(result, job)
-    state = result.state
     file = BytesIO()
     table = joint_table(file, name, job, result.orienting is not None)
-    table.batch(
-        Batch(
-            line=result.lines,
-            s=result.s,
-            t=result.t,
-            target=result.rows.target,
-            written=result.written.end,
-            force=result.force,
-            nominal=result.nominal,
-            joints=state.rho,
-            drive=state.drive,
-            behind=values_behind(result, job),
-        )
-    )
+    table.add(Totals(job, result.program.name).add_exact(result))
     table.close()
     return file.getvalue()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.totals import Totals
 from camcomp.model.config.load import load_config
 from camcomp.model.control import open_program
 from camcomp.model.job import Job
@@ -61,7 +62,7 @@ def missed(result, job, joint, width_rad):
 def test_a_joint_is_led_through_its_play(tmp_path, joint, moves):
     width = 3e-4
     result, job = corrected(tmp_path, joint, width, moves)
-    assert result.failed_checks(job, 1.0) == []
+    assert Totals.of(result, job).failed_checks(1.0) == []
     assert np.linalg.norm(result.before, axis=1).max() > 0.05
     assert missed(result, job, joint, width).max() < 1.2e-3
 
@@ -69,6 +70,6 @@ def test_a_joint_is_led_through_its_play(tmp_path, joint, moves):
 def test_a_joint_that_the_others_cannot_lead_the_tip_past_is_told(tmp_path):
     """While A3 stands the other joints would turn it on, not round: no words X, Y, Z take it through its play."""
     result, job = corrected(tmp_path, "A3", 3e-4, LINES)
-    [(rule, text)] = result.failed_checks(job, 1.0)
+    [(rule, text)] = Totals.of(result, job).failed_checks(1.0)
     assert rule == "CC601" and "um are left" in text
     assert np.median(np.linalg.norm(result.after, axis=1)) < 1e-3

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from camcomp.compensation.long import runs
-from camcomp.compensation.long import totals as bulktotals
 from camcomp.compensation.long.field import Field
 from camcomp.compensation.long.plain_run import NotInPieces
 from camcomp.compensation.long.program import LongProgram
 from camcomp.compensation.program.compensate import compensate
-from camcomp.compensation.report.tables import summary
+from camcomp.compensation.program.result import BOUND_UM
+from camcomp.compensation.totals import Totals
 from camcomp.gcode.plain_rows import csv_rows
 from camcomp.gcode.stamp import is_stamped
 from camcomp.ground.errors import CheckFailed, PhysicsError, ProgramError
@@ -77,7 +77,7 @@ def assert_same(job, text, tolerance=1.0, feed=2e-4):
         np.testing.assert_allclose(mine, values, rtol=1e-9, atol=2 * LAST_DIGIT, err_msg=name)
     drive = np.concatenate([batch.drive for batch in batches])
     np.testing.assert_allclose(drive, exact.state.drive, atol=2e-3 + 2e-4 * np.abs(exact.state.drive).max())
-    mine, other = totals.summary().as_json(), summary(exact, job).as_json()
+    mine, other = totals.summary().as_json(), Totals.of(exact, job).summary().as_json()
     assert set(other) <= set(mine)
     for key in ("points", "segments_in", "lines_out", "joining_lines", "method", "warnings"):
         assert mine[key] == other[key], key
@@ -144,8 +144,8 @@ def test_long_lines_are_divided_alike(orthoglide):
     assert np.abs(along).max() <= 1e-2 and np.abs(off - along[:, None] * way).max() <= 2 * LAST_DIGIT
     ends = np.flatnonzero(np.diff(exact.lines, append=0))
     assert np.abs(written - exact.written.end)[ends].max() <= LAST_DIGIT
-    mine, other = (each.after.rms_um for each in (totals.summary(), summary(exact, orthoglide)))
-    assert 1e3 * totals.after.most <= 1.0 and mine == pytest.approx(other, rel=0.02)
+    mine, other = (each.after.rms_um for each in (totals.summary(), Totals.of(exact, orthoglide).summary()))
+    assert totals.after.most_um <= 1.0 and mine == pytest.approx(other, rel=0.02)
 
 
 @pytest.mark.parametrize("model", ["mechanistic", "none"])
@@ -160,9 +160,9 @@ def test_other_force_models(tmp_path, model):
     job = Job(load_config([shipped("config/cartesian.yaml"), more]))
     (ours, totals, _), exact = both(job, mixed())
     assert NUMBER.sub("#", ours) == NUMBER.sub("#", exact.written.data.decode())
-    mine, other = (dict(each.before) for each in (totals.summary(), summary(exact, job)))
+    mine, other = (dict(each.before) for each in (totals.summary(), Totals.of(exact, job).summary()))
     assert mine == pytest.approx(other, rel=1e-3, abs=1e-3)
-    assert totals.after.most <= 1e-3
+    assert totals.after.most_um <= 1.0
 
 
 def stock(tmp_path, top):
@@ -305,7 +305,7 @@ def test_a_field_that_lies_is_caught(cartesian, monkeypatch):
     monkeypatch.setattr(Field, "packed", wrong)
     _, totals = run(cartesian, HEAD + "\n".join(circle(30)) + "\n")
     assert [rule for rule, _ in totals.failed_checks(1.0)] == ["CC607"]
-    assert totals.summary().interpolation.worst_um > bulktotals.BOUND_UM
+    assert totals.summary().interpolation.worst_um > BOUND_UM
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------

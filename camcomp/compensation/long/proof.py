@@ -1,0 +1,50 @@
+"""The proof of the interpolation of a long program: some of its points solved exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camcomp.compensation.long.plain import CorrectedRun, PlainCorrector
+from camcomp.compensation.program.result import Interpolation
+from camcomp.compensation.totals import JointRows
+from camcomp.ground.datatypes import Floats
+from camcomp.model.statics.target import correct, settle
+
+MOST_CHECKED, CHECKED_SHARE = 1000, 0.05  # points that are solved exactly, at most and of all
+
+
+class Sample:
+    """Random rows of a program; digest and size, bytes, of the program decide which."""
+
+    def __init__(self, digest: str, size: int) -> None:
+        self._random = np.random.default_rng(int(digest[:16], 16))
+        self._share = min(1.0, 3.0 * MOST_CHECKED * 24.0 / max(size, 1))  # a line has some 24 bytes
+        self._rows: list[Floats] = []
+
+    def add(self, corrector: PlainCorrector, done: CorrectedRun, rows: JointRows) -> None:
+        """Draw some of the rows of a run."""
+        chosen = np.flatnonzero(self._random.random(len(rows.s)) < self._share)
+        if len(chosen):
+            answers, target = done.answers, corrector.job.frame.to_machine(rows.target)
+            moves = (answers.correction, answers.unloaded, rows.joints, rows.drive, corrector.off(done))
+            self._rows.append(np.concatenate([each[chosen] for each in (target, rows.force, *moves)], axis=1))
+
+    def proof(self, corrector: PlainCorrector, points: int) -> tuple[Interpolation | None, int]:
+        """Differences of rows to their exact solutions, and the most iterations; points: rows of the program."""
+        if corrector.field is None or not self._rows:
+            return None, 0
+        machine, sample = corrector.machine, np.concatenate(self._rows)
+        count, m = min(MOST_CHECKED, max(MOST_CHECKED // 10, int(CHECKED_SHARE * points))), len(machine.actuators)
+        sample = sample[self._random.permutation(len(sample))[:count]]
+        sample = sample[np.lexsort(sample[:, :3].T)]
+        p, f, correction, unloaded, joints, drive, off = np.split(sample, np.cumsum([3, 3, 3, 3, m, m]), axis=1)
+        exact, (tip, _), (_, written) = (
+            correct(machine, p, f),
+            settle(machine, p, f),
+            settle(machine, p + correction + off, f),
+        )
+        gaps = (exact.commanded - p - correction, tip - p - unloaded)
+        found = corrector.field.proof(
+            gaps, written.rho_nominal - joints, written.drive - drive, 3 * len(p) + 2 * corrector.exact
+        )
+        return found, int(exact.iterations.max())
