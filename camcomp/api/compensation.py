@@ -15,7 +15,7 @@ from camcomp.compensation.program import compensate as story
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.result import Summary
 from camcomp.compensation.report import tables
-from camcomp.compensation.report.joint_table import joint_bytes
+from camcomp.compensation.report.tables import joint_bytes
 from camcomp.compensation.totals import Totals
 from camcomp.gcode.stamp import is_stamped
 from camcomp.ground.errors import CheckFailed

@@ -74,7 +74,7 @@ class ResultTable(Mapping[str, NDArray[Any]]):
 
     def to_parquet(self) -> bytes:
         """Parquet file in full precision. Raises ConfigError CC216 without pyarrow."""
-        from camcomp.compensation.report.parquet import library
+        from camcomp.compensation.report.tables import library
 
         arrow, parquet = library()
         file = io.BytesIO()

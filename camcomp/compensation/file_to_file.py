@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, BinaryIO
 
 from camcomp.compensation.program.result import Summary, interpolation_failed
-from camcomp.compensation.report.joint_table import JointTable, joint_table
+from camcomp.compensation.report.tables import JointTable
 from camcomp.ground.errors import ProgramError
 from camcomp.ground.files import writing
 from camcomp.model.job import Job
@@ -106,7 +106,7 @@ def compensate_long(
         return None
     names = paths.names()
     with suppress(_AsAWhole), writing(names, inputs=inputs, keep=not dry_run) as files:
-        joints = None if paths.joints is None else partial(joint_table, files[paths.joints], paths.joints, job)
+        joints = None if paths.joints is None else partial(JointTable, files[paths.joints], paths.joints, job)
         totals = compensate_in_pieces(
             source=source, name=name, job=job, settings=settings,
             program=files[paths.program].write if paths.program else len, joints=joints,

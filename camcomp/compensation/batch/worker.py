@@ -105,7 +105,7 @@ def work(task: Task) -> Outcome:
 
 def _compensate(task: Task) -> Outcome:
     from camcomp.compensation.program.compensate import compensate
-    from camcomp.compensation.report.joint_table import joint_bytes
+    from camcomp.compensation.report.tables import joint_bytes
     from camcomp.compensation.totals import Totals
     from camcomp.gcode.stamp import is_stamped
     from camcomp.ground.errors import CheckFailed
@@ -132,13 +132,13 @@ def _compensate(task: Task) -> Outcome:
 def _in_pieces(task: Task, job: Job) -> Outcome | None:
     """The outcome of a long program, as `camcomp compensate` writes it; None: it is corrected as a whole."""
     from camcomp.compensation.file_to_file import CorrectionSettings, compensate_in_pieces
-    from camcomp.compensation.report.joint_table import joint_table
+    from camcomp.compensation.report.tables import JointTable
 
     program, joints = BytesIO(), BytesIO()
     totals = compensate_in_pieces(
         source=BytesIO(task.data), name=task.name, job=job,
         settings=CorrectionSettings(method=task.method, tolerance_um=task.tolerance_um, version=__version__),
-        program=program.write, joints=partial(joint_table, joints, TABLE, job) if task.joints else None,
+        program=program.write, joints=partial(JointTable, joints, TABLE, job) if task.joints else None,
     )  # fmt: skip
     if totals is None:
         return None

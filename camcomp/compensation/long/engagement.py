@@ -17,24 +17,15 @@ class RunEngagement:
     before: Engaged | None
     after: Engaged | None
 
-    def around(self, own: slice) -> Engaged:
-        """For a path in which the motions of the run are `own`, with one motion on either side where there is any."""
-        return Engaged.joined(self.parts(own))
+    def around(self, own: slice) -> list[Engaged]:
+        """Parts for a path in which the motions of the run are `own`, with one motion on either side where there is any."""
+        return self.parts(own.start - 1, own.start, own.stop)
 
-    def parts(self, own: slice) -> list[Engaged]:
-        """The same in parts one behind the other."""
-        parts = [] if own.start == 0 or self.before is None else [_still(self.before, -1, own.start - 1)]
-        parts.append(replace(self.own, motion=self.own.motion + own.start))
-        return parts if self.after is None else [*parts, _still(self.after, 0, own.stop)]
-
-    def within(self, first: int, last: int) -> Engaged:
-        """For a path whose first motion is the one before the run, whose motions first on are the run's, and which ends at
-        motion `last` with the one behind it.
-        """
-        parts = [] if first == 0 or self.before is None else [_still(self.before, -1, 0)]
+    def parts(self, before: int, first: int, after: int) -> list[Engaged]:
+        """Parts one behind the other, for motion `before`, the run's motions from `first` on, and motion `after`."""
+        parts = [] if first == 0 or self.before is None else [_still(self.before, -1, before)]
         parts.append(replace(self.own, motion=self.own.motion + first))
-        parts += [] if self.after is None else [_still(self.after, 0, last)]
-        return Engaged.joined(parts)
+        return parts if self.after is None else [*parts, _still(self.after, 0, after)]
 
 
 def _still(engaged: Engaged, row: int, motion: int) -> Engaged:

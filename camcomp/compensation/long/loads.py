@@ -11,7 +11,7 @@ from camcomp.compensation.long.engagement import RunEngagement
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints, Path
-from camcomp.model.cutting.engaged import EngagedAt
+from camcomp.model.cutting.engaged import Engaged, EngagedAt
 from camcomp.model.cutting.piece_load import needed
 from camcomp.model.cutting.track import JOIN_ANGLE, PLUNGE_SINE, Conditions, Track, base_of, lay_track
 from camcomp.model.drawn import DrawnJob
@@ -94,7 +94,7 @@ def loads_of(context: RunContext, job: Job | DrawnJob) -> Loads:
         places = np.repeat(np.arange(n), 2), np.tile([0.0, 1.0], n), cuts, np.tile(constant, (2 * n, 1))
         return _linear(context.run, path, own, c, places)
     if met is not None and not c.plunges:
-        parts, lengths = met.parts(own), path_geometry.lengths(path)
+        parts, lengths = met.around(own), path_geometry.lengths(path)
         base = np.concatenate([base_of(path, c, each, lengths, extent=False) for each in parts])
         motion, u, depth, turn, bends = (
             np.concatenate([getattr(each, name) for each in parts])
@@ -102,7 +102,7 @@ def loads_of(context: RunContext, job: Job | DrawnJob) -> Loads:
         )
         rows, at = needed(motion, u, turn, bends, base), EngagedAt(motion, u, depth, turn)
         return _linear(context.run, path, own, c, (motion[rows], u[rows], turn[rows], base[rows]), at)
-    track = lay_track(path, c, None if met is None else met.around(own))
+    track = lay_track(path, c, None if met is None else Engaged.joined(met.around(own)))
     if met is None and len(track.motion) != n:  # a neighbour crosses the stock's top within NEAR
         raise NotInPieces
     first, last = np.searchsorted(track.motion, (own.start, own.stop)).tolist()

@@ -12,7 +12,7 @@ from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import follow
 from camcomp.compensation.long.loads import Loads, RunContext, joints_at, loads_of
 from camcomp.compensation.long.output_state import OutputState
-from camcomp.compensation.long.plain_run import Middles, NotInPieces, PlainRun, Unsolved
+from camcomp.compensation.long.plain_run import NotInPieces, PlainRun, Unsolved
 from camcomp.compensation.long.run_bands import RunUncertainty
 from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
@@ -53,7 +53,7 @@ class PlainRows:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Answers:
-    """Response of the machine at rows (N,), machine frame."""
+    """Response of the machine at points (N,), machine frame; the rest and the nominal joints where they are asked for."""
 
     correction: Floats  # (N, 3) mm
     unloaded: Floats  # (N, 3) mm, loaded tip minus target when the target itself is commanded
@@ -87,6 +87,17 @@ class CorrectedRun:
     def missed(self) -> Floats:
         """`after` (k, 3) mm minus the errors that the policy accepts."""
         return self.after if self.left is None else self.after - self.left
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Middles:
+    """Middles (k,) of lines."""
+
+    rows: Ints  # the end point of the line
+    move: Ints
+    wanted: Floats  # (k, 3) mm to be commanded there, program frame
+    share: Floats  # (k,) of the correction
+    answers: Answers
 
 
 def _sizes(vectors: Floats) -> Floats:
@@ -127,7 +138,7 @@ class PlainCorrector:
         hard = (loads.length > EASY_MM) & (run.plain.kind == LINE)
         for left in range(ROUNDS, 0, -1):
             rows = self._rows(run=run, loads=loads, lead=lead, trail=trail, hard=hard, tolerance=tolerance)
-            answers = self._answers(rows)
+            answers = self.ask(rows.move, rows.target, rows.force)
             commanded, kept, share = self._commanded(rows, answers, loads.motion, uncertainty, policy)
             if left == ROUNDS and self._drop_small_joints(rows, commanded, carry, lead, trail):
                 continue
@@ -167,7 +178,7 @@ class PlainCorrector:
             )
         return CorrectedRun(
             data=data, run=run, rows=rows, answers=answers, commanded=commanded, written=written, after=error,
-            before=self._back(np.concatenate((answers.unloaded[judged], middles.unloaded))), begin=begin, feed=held,
+            before=self._back(np.concatenate((answers.unloaded[judged], middles.answers.unloaded))), begin=begin, feed=held,
             rest=rest, seen=np.concatenate((np.flatnonzero(judged), middles.rows)), bands=bands, left=meant,
             apart=bool(carry.apart),
         )  # fmt: skip
@@ -198,7 +209,7 @@ class PlainCorrector:
     def _left(self, judged: Bools, answers: Answers, middles: Middles, share: Floats) -> Floats:
         """Errors (k, 3), program frame, that the policy leaves on purpose."""
         ends = (1.0 - share[judged])[:, None] * answers.unloaded[judged]
-        between = (1.0 - middles.share)[:, None] * middles.unloaded
+        between = (1.0 - middles.share)[:, None] * middles.answers.unloaded
         return self._back(np.concatenate((ends, between)))
 
     def _left_lines(self, run: PlainRun, loads: Loads, uncertainty: RunUncertainty) -> Loads:
@@ -214,9 +225,11 @@ class PlainCorrector:
         ends = w == 1.0
         target = np.where(ends[:, None], plain.end[moves], plain.start[moves])
         force = np.where(ends[:, None], loads.last[moves], loads.first[moves])
-        answer = self.ask(moves, target, force, every=False)[0]
-        there = uncertainty.moves(target + self._back(answer[:, :3]), moves, w, force, np.zeros(len(moves), np.bool_))
-        found, behind = excess(self._back(answer[:, 3:6]), there), np.flatnonzero(ends)
+        answers = self.ask(moves, target, force, every=False)
+        there = uncertainty.moves(
+            target + self._back(answers.correction), moves, w, force, np.zeros(len(moves), np.bool_)
+        )
+        found, behind = excess(self._back(answers.unloaded), there), np.flatnonzero(ends)
         self._alone = left_alone(np.tile(loads.motion, 2), np.concatenate((found[behind - 1], found[behind])))[:n]
         step = np.concatenate(([True], self._alone[1:] != self._alone[:-1], [True]))
         return replace(loads, jump=loads.jump | step)
@@ -260,8 +273,8 @@ class PlainCorrector:
         trial = trial_nodes(length, np.zeros(len(which)), np.ones(len(which), np.bool_))
         target = start[trial.piece] + trial.w[:, None] * way[trial.piece]
         force = loads.at(which[trial.piece], trial.w)
-        answer = self.ask(which[trial.piece], target, force, every=False)[0]
-        bend = second_derivative(trial, target + self._back(answer[:, :3]))
+        answers = self.ask(which[trial.piece], target, force, every=False)
+        bend = second_derivative(trial, target + self._back(answers.correction))
         nodes, shift = divide(trial, bend, tolerance)
         inner = np.arange(len(nodes.w)) != nodes.first[nodes.piece]
         return which[nodes.piece[inner]], nodes.w[inner], shift[inner]
@@ -287,15 +300,8 @@ class PlainCorrector:
     def _back(self, vectors: Floats) -> Floats:
         return vectors @ self.job.frame.rotation
 
-    def _answers(self, rows: PlainRows) -> Answers:
-        answer, nominal, tile, tiles = self.ask(rows.move, rows.target, rows.force, every=True)
-        return Answers(
-            correction=answer[:, :3], unloaded=answer[:, 3:6], rest=answer[:, 6:], nominal=nominal, tile=tile,
-            tiles=tiles,
-        )  # fmt: skip
-
-    def ask(self, move: Ints, target: Floats, force: Floats, every: bool) -> tuple[Floats, Floats, Ints, Tiles]:
-        """Answers (n, .) as in look_up, machine frame, for points of moves, program frame; nominal joints, tiles (n,).
+    def ask(self, move: Ints, target: Floats, force: Floats, every: bool = True) -> Answers:
+        """Answers at points of moves (n,), program frame; every: the rest and the nominal joints, too.
 
         A wider range of forces makes new tiles, so those that the numbers count go with them.
         """
@@ -307,7 +313,10 @@ class PlainCorrector:
         if len(lost):
             self.exact += len(lost)
             answer[lost], nominal[lost if every else []] = self._solved(move[lost], target[lost], force[lost], every)
-        return answer, nominal, tile, known.tiles
+        return Answers(
+            correction=answer[:, :3], unloaded=answer[:, 3:6], rest=answer[:, 6:], nominal=nominal, tile=tile,
+            tiles=known.tiles,
+        )  # fmt: skip
 
     def _commanded(
         self, rows: PlainRows, answers: Answers, of: Ints, uncertainty: RunUncertainty | None, policy: str
@@ -331,12 +340,6 @@ class PlainCorrector:
         single[:-1] &= motion[:-1] != motion[1:]
         kept = single & (np.abs(moved).max(axis=1) <= 0.5 * self.resolution)
         return rows.target + np.where(kept[:, None], 0.0, moved), kept, share
-
-    def _error_of(self, off: Floats, tile: Ints, tiles: Tiles) -> Floats:
-        """Tip errors (n, 3) mm of commands that are `off` (n, 3) mm from the exact command, machine frame."""
-        out = off.copy()
-        follow(tiles.slope, tile, off, out)
-        return out
 
     def off(self, done: CorrectedRun) -> Floats:
         """Written command minus exact command of the full correction (N, 3) mm, machine frame."""
@@ -384,12 +387,12 @@ class PlainCorrector:
         middle = 0.5 * (w + np.where(same, rows.w[at - 1], 0.0))
         start = run.plain.start[move]
         target = start + middle[:, None] * (run.plain.end[move] - start)
-        answer, _, tile, tiles = self.ask(move, target, loads.at(move, middle), every=False)
+        answers = self.ask(move, target, loads.at(move, middle), every=False)
         taken = np.ones(len(at))
         if share is not None:
             taken = 0.5 * (share[at] + share[np.maximum(at - 1, 0)])
-        wanted = target + taken[:, None] * self._back(answer[:, :3])
-        return Middles(rows=at, move=move, wanted=wanted, share=taken, unloaded=answer[:, 3:6], tile=tile, tiles=tiles)
+        wanted = target + taken[:, None] * self._back(answers.correction)
+        return Middles(rows=at, move=move, wanted=wanted, share=taken, answers=answers)
 
     def _halfway(self, ends: Floats, first: Floats) -> Floats:
         return 0.5 * (ends + np.concatenate((first[None], ends[:-1])))
@@ -402,9 +405,11 @@ class PlainCorrector:
         R = self.job.frame.rotation
         off = (written - commanded + rows.shift)[judged]
         told = self._halfway(written, first)[middles.rows] - middles.wanted
-        ends = self._error_of(off @ R.T, answers.tile[judged], answers.tiles)
-        between = self._error_of(told @ R.T, middles.tile, middles.tiles)
-        return np.concatenate((ends, between)) @ R
+        off = np.concatenate((off, told)) @ R.T  # from the exact command, machine frame
+        error, ends = off.copy(), len(off) - len(told)
+        follow(answers.tiles.slope, answers.tile[judged], off[:ends], error[:ends])
+        follow(middles.answers.tiles.slope, middles.answers.tile, off[ends:], error[ends:])
+        return error @ R
 
     # --- writing -------------------------------------------------------------------------------------------------
 

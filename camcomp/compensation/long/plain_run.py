@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.compensation.long.field import Tiles
 from camcomp.gcode.plain_lines import PlainMotions
 from camcomp.gcode.state import ControlState
 from camcomp.ground.datatypes import RAPID, Floats, Ints, Path
@@ -82,16 +81,3 @@ class PlainRun:
     def row_of(self, motion: int) -> int:
         """Lines of the program before that of a motion."""
         return self.row0 + int(self.plain.row[motion])
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Middles:
-    """Middles (k,) of lines."""
-
-    rows: Ints  # the end point of the line
-    move: Ints
-    wanted: Floats  # (k, 3) mm to be commanded there, program frame
-    share: Floats  # (k,) of the correction
-    unloaded: Floats  # (k, 3) mm, machine frame
-    tile: Ints  # (k,)
-    tiles: Tiles

@@ -230,7 +230,7 @@ class LongProgram:
         with part_of_work(here, here):
             result = compensate(
                 program, self.job, method="newton", tolerance_um=self.tolerance_um, version=self.version, part=part,
-                arcs=self.arcs, engaged=None if met is None else met.within(first, len(program.path) - 1),
+                arcs=self.arcs, engaged=None if met is None else Engaged.joined(met.parts(0, first, len(program.path) - 1)),
             )  # fmt: skip
         own = (result.rows.motion >= part.first) & (result.rows.motion < part.last)
         assert result.written.behind is not None
