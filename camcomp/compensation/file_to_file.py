@@ -75,7 +75,7 @@ def compensate_in_pieces(
     """
     if not is_for_pieces(source, job, settings):
         return None
-    from camcomp.compensation.long.plain_run import NotInPieces
+    from camcomp.compensation.long.linear_run import NotInPieces
     from camcomp.compensation.long.program import LongProgram
     from camcomp.model.control import setup_of
 

@@ -34,8 +34,8 @@ from camcomp.model.job import Job
 from camcomp.model.trajectory.moves import line_moves, moves_of
 
 if TYPE_CHECKING:
-    from camcomp.compensation.long.plain import CorrectedRun, PlainCorrector
-    from camcomp.compensation.long.plain_run import PlainRun
+    from camcomp.compensation.long.linear_corrector import CorrectedRun, LinearCorrector
+    from camcomp.compensation.long.linear_run import LinearRun
     from camcomp.compensation.long.runs import Runs
 
 SAME_MM = 1e-9  # of a place as programmed and as written
@@ -105,21 +105,21 @@ class Totals:
 
     # --- parts ---------------------------------------------------------------------------------------------------
 
-    def add_plain(self, whole: PlainRun, done: CorrectedRun, corrector: PlainCorrector) -> JointRows:
-        """Add a run of plain lines."""
+    def add_linear(self, whole: LinearRun, done: CorrectedRun, corrector: LinearCorrector) -> JointRows:
+        """Add a run of linear moves."""
         run, rows, answers = done.run, done.rows, done.answers
-        plain, path = run.plain, whole.path()
-        way = plain.end - plain.start
+        linear, path = run.linear, whole.path()
+        way = linear.end - linear.start
         length = np.sqrt(np.einsum("ni,ni->n", way, way))
         s = self._s + (np.cumsum(length) - length)[rows.move] + rows.w * length[rows.move]
-        feed = self._fed(plain.feed[rows.move])
-        moving = (plain.kind[rows.move] != RAPID) & (feed > 0.0)
+        feed = self._fed(linear.feed[rows.move])
+        moving = (linear.kind[rows.move] != RAPID) & (feed > 0.0)
         t = self._t + np.cumsum(np.where(moving, np.diff(s, prepend=self._s) / np.where(moving, feed, 1.0) * 60.0, 0.0))
         self._s, self._t = self._s + float(length.sum()), float(t[-1])
         joints, drive = corrector.actuators(done)
         self.step_mm = max(self.step_mm, corrector.resolution)
         out = JointRows(
-            line=plain.row[rows.move] + run.row0 + 1, s=s, t=t, target=rows.target, written=done.written,
+            line=linear.row[rows.move] + run.row0 + 1, s=s, t=t, target=rows.target, written=done.written,
             force=self.job.frame.vectors(rows.force), nominal=answers.nominal, joints=joints, drive=drive,
             behind=self._behind(self._columns(done.bands), rows.engagement),
         )  # fmt: skip
@@ -127,10 +127,10 @@ class Totals:
             out, joining=rows.joining, corrected=np.ones(len(s), np.bool_), tilt=answers.rest[:, :3],
             before=done.before, after=done.after, missed=done.missed,
         )  # fmt: skip
-        self._plain_control(run, done)
-        self._examine(path, rows.target, done.written, plain.kind[rows.move] != RAPID)
+        self._linear_control(run, done)
+        self._examine(path, rows.target, done.written, linear.kind[rows.move] != RAPID)
         if run.state.sense == 0.0:
-            self._stands(np.unique(plain.row[rows.move[rows.force.any(axis=1)]]) + run.row0 + 1)
+            self._stands(np.unique(linear.row[rows.move[rows.force.any(axis=1)]]) + run.row0 + 1)
         return out
 
     def add_piece(self, result: Compensated, own: Bools, part: Part) -> JointRows:
@@ -216,27 +216,29 @@ class Totals:
         """Feeds (n,) mm/min, where none is stated the config's."""
         return np.where(np.isnan(feed), self.job.config.process.feed_mm_per_min or np.nan, feed)
 
-    def _plain_control(self, run: PlainRun, done: CorrectedRun) -> None:
-        """Plan the moves of plain lines as the controller does."""
-        plain, rows, mode = run.plain, done.rows, run.state.path_mode
+    def _linear_control(self, run: LinearRun, done: CorrectedRun) -> None:
+        """Plan the moves of linear moves as the controller does."""
+        linear, rows, mode = run.linear, done.rows, run.state.path_mode
         before, after = self._control
         self.modes[mode] = None
-        fed = self._fed(plain.feed)
-        before.add(line_moves(kind=plain.kind, start=plain.start, end=plain.end, feed=fed, mode=mode, waits=run.waits))
+        fed = self._fed(linear.feed)
+        before.add(
+            line_moves(kind=linear.kind, start=linear.start, end=linear.end, feed=fed, mode=mode, waits=run.waits)
+        )
         start = np.concatenate((done.begin[None], done.written[:-1]))
         moves = line_moves(
-            kind=plain.kind[rows.move], start=start, end=done.written, feed=done.feed, mode=mode, waits=run.waits
+            kind=linear.kind[rows.move], start=start, end=done.written, feed=done.feed, mode=mode, waits=run.waits
         )
         moves = replace(moves, exact=moves.exact | done.rest)
         if done.apart:
             self.apart[mode] = None
             moves = replace(moves, merge=np.zeros(len(moves)))
         self.resting += int(done.rest.sum())
-        ends = len(rows.move) - np.count_nonzero(rows.joining | (plain.kind[rows.move] == RAPID))
+        ends = len(rows.move) - np.count_nonzero(rows.joining | (linear.kind[rows.move] == RAPID))
         seen = done.seen
         told = np.concatenate((done.written[seen[:ends]], 0.5 * (start + done.written)[seen[ends:]]))
         joining = np.concatenate((rows.joining, [False]))
-        line = plain.row[rows.move[seen]] + run.row0 + 1
+        line = linear.row[rows.move[seen]] + run.row0 + 1
         after.add(moves, SeenPoints(seen, told, done.missed, line, joining[seen - 1] | joining[seen + 1]))
 
     def _exact_control(self, result: Compensated, own: Bools, part: Part) -> None:

@@ -16,11 +16,11 @@ from camcomp.gcode.words import BLANK, Line, Word, code_of, read_line
 from camcomp.ground.errors import ProgramError
 
 if TYPE_CHECKING:
-    from camcomp.gcode.plain_reader import PlainReader
+    from camcomp.gcode.linear_reader import LinearReader
 
 _MOST_BLOCKS = 150_000  # executed by a program that has loops
 _MOST_IDLE = 100_000  # consecutive blocks without a motion
-MIN_ROWS = 256  # of a program that is searched for runs of plain lines
+MIN_ROWS = 256  # of a program that is searched for runs of linear moves
 _INCREMENTAL_LETTERS = "XYZIJKRQ"
 
 
@@ -60,17 +60,17 @@ class Flow:
                 return
             row = after
 
-    def _reader_ahead(self) -> PlainReader | None:
-        """The reader of runs of plain lines; None where the program is too short for it or every line is asked for."""
+    def _reader_ahead(self) -> LinearReader | None:
+        """The reader of runs of linear moves; None where the program is too short for it or every line is asked for."""
         if self.trace is not None or self.rows < MIN_ROWS:
             return None
-        from camcomp.gcode.plain_reader import PlainReader  # loads the compiler, which short programs do not wait for
+        from camcomp.gcode.linear_reader import LinearReader  # loads the compiler, which short programs do not wait for
 
         reader = self.reader
-        return PlainReader(self.text, reader.state, reader.record, self.rows, reader.dialect.increments)
+        return LinearReader(self.text, reader.state, reader.record, self.rows, reader.dialect.increments)
 
     def _passed(self, rows: int, stated: bool) -> None:
-        """Count plain lines that were read at once. stated: a motion code stands in them."""
+        """Count linear moves that were read at once. stated: a motion code stands in them."""
         self._blocks += rows
         self._idle, self._motions = 0, len(self.reader.record)
         if stated:

@@ -15,7 +15,7 @@ from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
 
 # Columns of Sites.begin and Sites.finish.
 X, Y, Z, I, J, K, R, F, P, A, B, C, G = range(13)
-PLAIN_LETTERS = "XYZFG"  # of plain lines, in the columns of PlainMotions.begin and finish
+LINEAR_LETTERS = "XYZFG"  # of linear moves, in the columns of LinearMotions.begin and finish
 LETTERS = "XYZIJKRFPABCG"  # A, B, C: words of the orientation of any notation
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from camcomp.gcode.arcs import PLANES
 from camcomp.gcode.path_mode import PathMode
-from camcomp.gcode.program import LETTERS, PLAIN_LETTERS, Sites
+from camcomp.gcode.program import LETTERS, LINEAR_LETTERS, Sites
 from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import Text
 from camcomp.gcode.words import Word
@@ -19,7 +19,7 @@ from camcomp.ground import orientation
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Path, frozen
 
 if TYPE_CHECKING:
-    from camcomp.gcode.plain_lines import PlainMotions
+    from camcomp.gcode.linear_lines import LinearMotions
 
 NUMBERS = 33  # per motion
 _NO_CENTRE = [math.nan, math.nan, math.nan]
@@ -177,8 +177,8 @@ class Recorder:
             self.code_stated = self.feed_stated = False
         state.position = end
 
-    def plain_motions(self, row: int, found: PlainMotions, state: ControlState) -> None:
-        """Motions of plain lines, the first of which is line `row`; state: that in front of them."""
+    def linear_motions(self, row: int, found: LinearMotions, state: ControlState) -> None:
+        """Motions of linear moves, the first of which is line `row`; state: that in front of them."""
         n = len(found.row)
         numbers = np.zeros((n, NUMBERS))
         numbers[:, 0], numbers[:, 1], numbers[:, 2] = row + found.row, found.kind, found.kind != RAPID
@@ -192,7 +192,7 @@ class Recorder:
         numbers[:, 27:30] = numbers[:, 30:33] = state.turns_to
         numbers[0, 27:30] = state.turned
         spans = np.full((n, len(LETTERS), 2), -1, np.int64)
-        spans[:, [LETTERS.index(each) for each in PLAIN_LETTERS]] = np.stack((found.begin, found.finish), axis=2)
+        spans[:, [LETTERS.index(each) for each in LINEAR_LETTERS]] = np.stack((found.begin, found.finish), axis=2)
         self._numbers.frombytes(numbers.tobytes())
         self._spans.frombytes(spans.tobytes())
         self.modes += [state.path_mode] * n

@@ -26,9 +26,9 @@ from camcomp.ground.datatypes import ARC, RAPID, Floats, Ints
 from camcomp.ground.errors import ProgramError
 
 if TYPE_CHECKING:
-    from camcomp.gcode.plain_writer import PlainWriter
+    from camcomp.gcode.linear_writer import LinearWriter
 
-MIN_MOTIONS = 256  # of a program that is searched for runs of plain motions
+MIN_MOTIONS = 256  # of a program that is searched for runs of linear motions
 MIN_RUN = 4  # motions; shorter runs are written one by one
 
 
@@ -81,7 +81,7 @@ class Writer(LineEditor):
         self.out = out
         self.turns = program.language.writes_turns
         self.inserted = 0  # new lines so far
-        self._runs: PlainWriter | None = None
+        self._runs: LinearWriter | None = None
         self.ours = ""  # path mode written by this writer and in force; empty: the program's
         self.stated = program.setup.path_mode  # last one of the program
         self.ends = np.empty((len(out.motion), 3))
@@ -121,18 +121,18 @@ class Writer(LineEditor):
         x, y, z = map(float, self.position)
         return Standing((x, y, z), self.code, self.feed)
 
-    # --- runs of plain motions ---------------------------------------------------------------------------------
+    # --- runs of linear motions ---------------------------------------------------------------------------------
 
     def _find_runs(self, bounds: Ints) -> None:
         """Load the compiled writer where the program is long enough for it."""
         if len(self.path) < MIN_MOTIONS:
             return
-        from camcomp.gcode.plain_writer import PlainWriter  # loads the compiler, which short programs do not wait for
+        from camcomp.gcode.linear_writer import LinearWriter  # loads the compiler, which short programs do not wait for
 
-        self._runs = PlainWriter(self.program, self.out, self.resolution, bounds)
+        self._runs = LinearWriter(self.program, self.out, self.resolution, bounds)
 
     def _advance(self, k: int, last: int, bounds: Ints) -> int:
-        """Write motion k, or the run of plain motions that it begins, up to `last`; the motion behind it."""
+        """Write motion k, or the run of linear motions that it begins, up to `last`; the motion behind it."""
         if self._runs is not None:
             behind = min(int(self._runs.behind[k]), last)
             if behind - k >= MIN_RUN and self._holds_mode(k, int(bounds[k])):

@@ -94,11 +94,11 @@ class TipField:
         judged = self._exact(tests)
         self._learn(points[np.unique(np.concatenate((points.argmin(axis=0), points.argmax(axis=0))))])
         for degree in DEGREES:
-            wanted = _samples(degree) - TESTS - len(self._known)
-            if wanted > len(order):
+            count = _samples(degree) - TESTS - len(self._known)
+            if count > len(order):
                 return None
-            self._learn(points[order[: max(wanted, 0)]])
-            order = order[max(wanted, 0) :]
+            self._learn(points[order[: max(count, 0)]])
+            order = order[max(count, 0) :]
             fit = self._supporting(points, degree, random)
             if fit.misses(tests, judged, self._moves) <= (ACCURATE if degree < DEGREES[-1] else ENDURED):
                 return fit

@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from camcomp.compensation.long.plain_run import PlainRun
+from camcomp.compensation.long.linear_run import LinearRun
 from camcomp.compensation.long.runs import InterpretedRun, Runs
 from camcomp.gcode.setup import Setup
 from camcomp.ground.datatypes import RAPID, Path
@@ -40,10 +40,10 @@ class FollowedRuns:
         if stock.type == "program" or job.config.tools:
             runs = Runs(source=source, name=name, setup=setup, dialect=job.config.control.dialect)
             for run in runs:
-                if isinstance(run, PlainRun):
+                if isinstance(run, LinearRun):
                     if stock.type == "program":
                         bounds.add(run.path())
-                    elif (run.plain.kind != RAPID).any():
+                    elif (run.linear.kind != RAPID).any():
                         bounds.tools.add(run.state.tool)
                 elif isinstance(run, InterpretedRun) and run.motions:
                     bounds.add(runs.program(run.text, run.row0, run.state).path)

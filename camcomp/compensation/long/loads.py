@@ -8,7 +8,7 @@ import numpy as np
 
 from camcomp.compensation.long.engaged_loads import lay_engaged
 from camcomp.compensation.long.engagement import RunEngagement
-from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
+from camcomp.compensation.long.linear_run import LinearRun, NotInPieces
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints, Path
 from camcomp.model.cutting.engaged import Engaged, EngagedAt
@@ -24,7 +24,7 @@ Places = tuple[Ints, Floats, Floats, Floats]  # motion, fraction, engaged arcs (
 class RunContext:
     """A run with the motions next to it, which have their direction at the run's side, and where a stock is known its engagement."""
 
-    run: PlainRun
+    run: LinearRun
     before: Path | None
     after: Path | None
     engaged: RunEngagement | None = None
@@ -45,7 +45,7 @@ class Loads:
     last: Floats  # (n, 3) N at its end
     jump: Bools  # (n + 1,) the force jumps at the start of each move, and behind the last one
     length: Floats  # (n,) mm
-    run: PlainRun  # the moves
+    run: LinearRun  # the moves
     of: Ints  # (n,) motion that a move is a part of, counted with the motion in front of the run
     u0: Floats  # (n,) which part
     u1: Floats
@@ -87,14 +87,14 @@ def constant_of(job: Job | DrawnJob) -> Floats | None:
 
 def loads_of(context: RunContext, job: Job | DrawnJob) -> Loads:
     """Forces along a run under the conditions of a job. Raises NotInPieces where the stock's top is too near."""
-    (path, own), c, met, constant = context.path(), job.conditions, context.engaged, constant_of(job)
+    (path, own), c, engaged, constant = context.path(), job.conditions, context.engaged, constant_of(job)
     n = len(path)
     if constant is not None:
         cuts = np.repeat(path.known & ~path.machine, 2).astype(float)
         places = np.repeat(np.arange(n), 2), np.tile([0.0, 1.0], n), cuts, np.tile(constant, (2 * n, 1))
         return _linear(context.run, path, own, c, places)
-    if met is not None and not c.plunges:
-        parts, lengths = met.around(own), path_geometry.lengths(path)
+    if engaged is not None and not c.plunges:
+        parts, lengths = engaged.around(own), path_geometry.lengths(path)
         base = np.concatenate([base_of(path, c, each, lengths, extent=False) for each in parts])
         motion, u, depth, turn, bends = (
             np.concatenate([getattr(each, name) for each in parts])
@@ -102,13 +102,13 @@ def loads_of(context: RunContext, job: Job | DrawnJob) -> Loads:
         )
         rows, at = needed(motion, u, turn, bends, base), EngagedAt(motion, u, depth, turn)
         return _linear(context.run, path, own, c, (motion[rows], u[rows], turn[rows], base[rows]), at)
-    track = lay_track(path, c, None if met is None else Engaged.joined(met.around(own)))
-    if met is None and len(track.motion) != n:  # a neighbour crosses the stock's top within NEAR
+    track = lay_track(path, c, None if engaged is None else Engaged.joined(engaged.around(own)))
+    if engaged is None and len(track.motion) != n:  # a neighbour crosses the stock's top within NEAR
         raise NotInPieces
     first, last = np.searchsorted(track.motion, (own.start, own.stop)).tolist()
     moves, zero, one = np.arange(first, last), np.zeros(last - first), np.ones(last - first)
     of, parts_of = track.motion[first:last], context.run
-    if met is not None:
+    if engaged is not None:
         parts_of = context.run.parts(of - own.start, track.points(moves, zero), track.points(moves, one))
     return Loads(
         first=track.force(moves, zero), last=track.force(moves, one),
@@ -118,7 +118,7 @@ def loads_of(context: RunContext, job: Job | DrawnJob) -> Loads:
 
 
 def _linear(
-    run: PlainRun, path: Path, own: slice, c: Conditions, places: Places, engaged: EngagedAt | None = None
+    run: LinearRun, path: Path, own: slice, c: Conditions, places: Places, engaged: EngagedAt | None = None
 ) -> Loads:
     """Loads in parts between places; the force is linear between them."""
     motion, u, turn, base = places
@@ -148,7 +148,7 @@ def _linear(
 
 def joints_at(loads: Loads, before: Path | None, after: Path | None) -> tuple[Bools, Bools]:
     """Moves (n,) that get a joining line in front, and behind: as row_layout has it, but for the length of the jump."""
-    feed = loads.run.plain.kind == LINE
+    feed = loads.run.linear.kind == LINE
     lead = loads.jump[:-1] & feed
     corrected = [each is not None and bool(each.known[0] & ~each.machine[0]) for each in (before, after)]
     machine = before is not None and bool(before.machine[0])

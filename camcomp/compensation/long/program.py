@@ -1,6 +1,6 @@
 """Long programs: read, corrected and written piece by piece, in constant memory.
 
-Runs of plain lines are corrected by interpolation between exact solutions (field.py); what stands between them goes,
+Runs of linear moves are corrected by interpolation between exact solutions (field.py); what stands between them goes,
 with the lines next to it, through the exact way (compensate.py). At the end a random sample of the interpolated rows is
 solved exactly, and the largest difference is part of the result.
 """
@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from camcomp.compensation.long.engagement import RunEngagement
+from camcomp.compensation.long.linear_corrector import LinearCorrector
+from camcomp.compensation.long.linear_run import LinearRun, NotInPieces, Unsolved
 from camcomp.compensation.long.loads import RunContext
 from camcomp.compensation.long.output_state import OutputState
-from camcomp.compensation.long.plain import PlainCorrector
-from camcomp.compensation.long.plain_run import NotInPieces, PlainRun, Unsolved
 from camcomp.compensation.long.proof import Sample
 from camcomp.compensation.long.runs import InterpretedRun, Runs
 from camcomp.compensation.program.compensate import compensate
@@ -69,7 +69,7 @@ class LongProgram:
                 raise CheckFailed("CC603", f"{self.name} was compensated before")
             rest = block[-LINE_OF_STAMP:]
         source.seek(0)
-        self._carry = OutputState(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
+        self._output = OutputState(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
         self._told: Future[None] = Future()
         self._told.set_result(None)
         self.totals = Totals(self.job, self.name, tolerance_um=self.tolerance_um, tabled=self.on_rows is not None)
@@ -82,7 +82,7 @@ class LongProgram:
             source=source, name=self.name, setup=self.setup, dialect=self.job.config.control.dialect,
             top_mm=np.nan if top is None else top,
         )  # fmt: skip
-        self._corrector = PlainCorrector(self.job, self.tolerance_um, self._runs.language, self._runs.feed_point)
+        self._corrector = LinearCorrector(self.job, self.tolerance_um, self._runs.language, self._runs.feed_point)
         self._stamp: str | None = stamp_text(digest.hexdigest(), self.version, self.job.fingerprint)
         with ThreadPoolExecutor(1) as self._beside:
             for data in self._pieces():
@@ -142,28 +142,28 @@ class LongProgram:
 
     def _corrected(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
         if isinstance(piece.run, InterpretedRun):
-            return self._odd(piece.run, piece, before, after)
-        return self._plain(piece.run, piece, before, after)
+            return self._interpreted(piece.run, piece, before, after)
+        return self._linear(piece.run, piece, before, after)
 
-    # --- plain lines ---------------------------------------------------------------------------------------------
+    # --- linear moves ---------------------------------------------------------------------------------------------
 
-    def _plain(self, run: PlainRun, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
+    def _linear(self, run: LinearRun, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
         try:
             edges = (before.last if before else None, after.first if after else None)
-            context = RunContext(run, *edges, self._met(piece, before, after))
-            done = self._corrector.correct(context, self._carry)
+            context = RunContext(run, *edges, self._engagement_of(piece, before, after))
+            done = self._corrector.correct(context, self._output)
         except Unsolved as error:
             self._refuse(run, error)
 
         def tell() -> JointRows:
-            rows = self.totals.add_plain(run, done, self._corrector)
+            rows = self.totals.add_linear(run, done, self._corrector)
             self._sample.add(self._corrector, done, rows)
             return rows
 
         self._tell(tell)
         return done.data
 
-    def _met(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> RunEngagement | None:
+    def _engagement_of(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> RunEngagement | None:
         """Engagement of the tool on a piece and next to it."""
         if piece.engaged is None:
             return None
@@ -190,7 +190,7 @@ class LongProgram:
         self._told.result()
         self._told = self._beside.submit(tell)
 
-    def _refuse(self, run: PlainRun, error: Unsolved) -> None:
+    def _refuse(self, run: LinearRun, error: Unsolved) -> None:
         errors: list[PhysicsError] = []
         seen: set[int] = set()
         for i, target, status in zip(error.move.tolist(), error.target, error.status, strict=True):
@@ -200,41 +200,41 @@ class LongProgram:
             x, y, z = self.job.frame.to_program(target[None])[0]
             text = f"{STATUS.get(int(status), 'no solution')} at X{x:.4f} Y{y:.4f} Z{z:.4f} (program frame, mm)"
             source = run.text_of(i).decode("latin-1").rstrip("\r\n")
-            column = int(run.plain.begin[i, :3][run.plain.begin[i, :3] >= 0].min() - run.plain.line[i, 0]) + 1
-            at = Location(self.name, run.row0 + int(run.plain.row[i]) + 1, column, source)
+            column = int(run.linear.begin[i, :3][run.linear.begin[i, :3] >= 0].min() - run.linear.line[i, 0]) + 1
+            at = Location(self.name, run.row0 + int(run.linear.row[i]) + 1, column, source)
             errors.append(PhysicsError(RULE_OF_STATUS.get(int(status), "CC301"), text, at=at))
         raise_all(errors)
 
     # --- other lines ---------------------------------------------------------------------------------------------
 
-    def _odd(self, run: InterpretedRun, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
+    def _interpreted(self, run: InterpretedRun, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
         """Through the exact way, with the motions on either side in sight."""
         head, state, row0 = b"", run.state, run.row0
         first = behind = 0
         if before is not None:
-            assert isinstance(before.run, PlainRun)
+            assert isinstance(before.run, LinearRun)
             k = before.ends[1]
             head, state, row0 = before.run.text_from(k), before.run.before(k), before.run.row_of(k)
             first = before.run.motions - k
         tail = b""
         if after is not None:
-            assert isinstance(after.run, PlainRun)
+            assert isinstance(after.run, LinearRun)
             tail = after.run.text_until(after.ends[0])
             behind = after.ends[0] + 1
         program = self._runs.program(head + run.text + tail, row0, state)
-        part = Part(first, len(program.path) - behind, self._carry.standing())
+        part = Part(first, len(program.path) - behind, self._output.standing())
         if part.last - part.first != run.motions:
             raise NotInPieces
-        met = self._met(piece, before, after)
+        engaged = self._engagement_of(piece, before, after)
         here = row0 / self._lines
         with part_of_work(here, here):
             result = compensate(
                 program, self.job, method="newton", tolerance_um=self.tolerance_um, version=self.version, part=part,
-                arcs=self.arcs, engaged=None if met is None else Engaged.joined(met.parts(0, first, len(program.path) - 1)),
+                arcs=self.arcs, engaged=None if engaged is None else Engaged.joined(engaged.parts(0, first, len(program.path) - 1)),
             )  # fmt: skip
         own = (result.rows.motion >= part.first) & (result.rows.motion < part.last)
         assert result.written.behind is not None
-        self._carry.take(result.written.behind, result.rows.end[np.flatnonzero(own)[-1]])
+        self._output.take(result.written.behind, result.rows.end[np.flatnonzero(own)[-1]])
         self._tell(lambda: self.totals.add_piece(result, own, part))
         return result.written.data[len(head) : len(result.written.data) - len(tail)]
 
@@ -247,20 +247,20 @@ def _stock_of(job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRu
     return FollowedRuns.of(job, source, name, setup)
 
 
-def _text_of(run: PlainRun | InterpretedRun) -> bytes:
+def _text_of(run: LinearRun | InterpretedRun) -> bytes:
     return run.text if isinstance(run, InterpretedRun) else run.data[run.text_at : run.text_end].tobytes()
 
 
 class _Piece:
     """A run with what its neighbours need to know of it."""
 
-    def __init__(self, run: PlainRun | InterpretedRun, runs: Runs) -> None:
+    def __init__(self, run: LinearRun | InterpretedRun, runs: Runs) -> None:
         self.run = run
         self.engaged: Engaged | None = None  # what the tool meets, or, as long as it is only looked at, at its begin
         self._path: Path | None = None
-        if isinstance(run, PlainRun):
-            plain = run.plain
-            real = np.flatnonzero((plain.kind == RAPID) | (plain.start != plain.end).any(axis=1))
+        if isinstance(run, LinearRun):
+            linear = run.linear
+            real = np.flatnonzero((linear.kind == RAPID) | (linear.start != linear.end).any(axis=1))
             if not len(real):
                 raise NotInPieces
             self.ends = (int(real[0]), int(real[-1]))
@@ -285,5 +285,5 @@ class _Piece:
         """The motions."""
         if self._path is not None:
             return self._path
-        assert isinstance(self.run, PlainRun)
+        assert isinstance(self.run, LinearRun)
         return self.run.path()

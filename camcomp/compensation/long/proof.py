@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from camcomp.compensation.long.plain import CorrectedRun, PlainCorrector
+from camcomp.compensation.long.linear_corrector import CorrectedRun, LinearCorrector
 from camcomp.compensation.program.result import Interpolation
 from camcomp.compensation.totals import JointRows
 from camcomp.ground.datatypes import Floats
@@ -21,7 +21,7 @@ class Sample:
         self._share = min(1.0, 3.0 * MOST_CHECKED * 24.0 / max(size, 1))  # a line has some 24 bytes
         self._rows: list[Floats] = []
 
-    def add(self, corrector: PlainCorrector, done: CorrectedRun, rows: JointRows) -> None:
+    def add(self, corrector: LinearCorrector, done: CorrectedRun, rows: JointRows) -> None:
         """Draw some of the rows of a run."""
         chosen = np.flatnonzero(self._random.random(len(rows.s)) < self._share)
         if len(chosen):
@@ -29,7 +29,7 @@ class Sample:
             moves = (answers.correction, answers.unloaded, rows.joints, rows.drive, corrector.off(done))
             self._rows.append(np.concatenate([each[chosen] for each in (target, rows.force, *moves)], axis=1))
 
-    def proof(self, corrector: PlainCorrector, points: int) -> tuple[Interpolation | None, int]:
+    def proof(self, corrector: LinearCorrector, points: int) -> tuple[Interpolation | None, int]:
         """Differences of rows to their exact solutions, and the most iterations; points: rows of the program."""
         if corrector.field is None or not self._rows:
             return None, 0

@@ -1,4 +1,4 @@
-"""What uncertain numbers do along a run of plain lines."""
+"""What uncertain numbers do along a run of linear moves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A long program in pieces: runs of plain lines, read compiled, and what stands between them, read by the interpreter.
+"""A long program in pieces: runs of linear moves, read compiled, and what stands between them, read by the interpreter.
 
 Every piece knows the state of the control at its begin, so that it can be corrected and written by itself. Programs that
 jump, loop or call cannot be cut into pieces; they are recognised and left to the reader of whole programs.
@@ -14,11 +14,11 @@ from typing import BinaryIO
 
 import numpy as np
 
-from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
+from camcomp.compensation.long.linear_run import LinearRun, NotInPieces
 from camcomp.gcode.detect import dialect_of
 from camcomp.gcode.interpret import Interpreter, controller
-from camcomp.gcode.plain_lines import LONGEST_END, MORE, PlainMotions, scan
-from camcomp.gcode.plain_reader import follow, is_plain, motion_number
+from camcomp.gcode.linear_lines import LONGEST_END, MORE, LinearMotions, scan
+from camcomp.gcode.linear_reader import follow, is_linear, motion_number
 from camcomp.gcode.program import Program
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.state import ControlState
@@ -30,8 +30,8 @@ from camcomp.model.config.spec import Config
 from camcomp.model.control import waiting_s
 
 CHUNK_BYTES = 1 << 21  # bytes read at once
-RUN = 1 << 14  # motions of a plain run at most
-PROBE_MOTIONS = 48  # plain motions in a row that make a run of their own
+RUN = 1 << 14  # motions of a linear run at most
+PROBE_MOTIONS = 48  # linear motions in a row that make a run of their own
 _PROGRAM = re.compile(rb"(?:^|[\r\n])[ \t]*[O:][ \t]*\d", re.IGNORECASE)
 _END = re.compile(END_OF_LINE.encode())
 
@@ -87,30 +87,30 @@ class Runs:
         self._seen = False  # a line with something in it was read
         self._told: set[str] = set()
 
-    def __iter__(self) -> Iterator[PlainRun | InterpretedRun | bytes]:
+    def __iter__(self) -> Iterator[LinearRun | InterpretedRun | bytes]:
         """Runs in order; bytes behind the program's end, as they are."""
-        odd = _InterpretedLines()
+        held = _InterpretedLines()
         ended = False
         while not ended:
-            row, before = self._row, None if odd.lines else self._state
-            found = self._plain(PROBE_MOTIONS if odd.lines else RUN)
+            row, before = self._row, None if held.lines else self._state
+            found = self._linear(PROBE_MOTIONS if held.lines else RUN)
             if found is not None:
-                if odd.lines and found.motions < PROBE_MOTIONS:
-                    odd.add(found.data[found.text_at : found.text_end].tobytes(), found.motions)
+                if held.lines and found.motions < PROBE_MOTIONS:
+                    held.add(found.data[found.text_at : found.text_end].tobytes(), found.motions)
                     continue
-                if odd.lines:
-                    yield odd.take()
+                if held.lines:
+                    yield held.take()
                 yield found
                 continue
             line = self._next_line()
             if line is None:
                 break
             if before is not None:
-                odd.start(row, deepcopy(before))
+                held.start(row, deepcopy(before))
             motions, ended = self._interpret(line)
-            odd.add(line, motions)
-        if odd.lines:
-            yield odd.take()
+            held.add(line, motions)
+        if held.lines:
+            yield held.take()
         if not self.motions:
             raise ProgramError("CC100", "the program moves nothing", at=Location(self.name, 1, 1))
         yield from self._rest()
@@ -167,28 +167,28 @@ class Runs:
 
     # --- lines ---------------------------------------------------------------------------------------------------
 
-    def _plain(self, limit: int) -> PlainRun | None:
-        """The plain lines from here on; None if they contain no motion."""
+    def _linear(self, limit: int) -> LinearRun | None:
+        """The linear moves from here on; None if they contain no motion."""
         state = self._state
-        if not is_plain(state):
+        if not is_linear(state):
             return None
-        room, position, begin = PlainMotions.room(limit), np.array(state.position), self._at
+        room, position, begin = LinearMotions.room(limit), np.array(state.position), self._at
         n, rows, at, why, code, feed, coded, fed = scan(
             self._data, begin, len(self._data), self._last, motion_number(state), state.feed or 0.0, *self._flags,
             position, state.unit, np.array(state.offset), self.language.increments, self.top_mm, room, limit,
         )  # fmt: skip
         if why == MORE and n == 0 and self._more():
-            return self._plain(limit)
+            return self._linear(limit)
         if n == 0 or (why == MORE and n < PROBE_MOTIONS and self._more()):
-            return self._plain(limit) if n else None
+            return self._linear(limit) if n else None
         self._flags = [bool(coded), bool(fed)]
         follow(state, code, feed, position)
         self._at = at
         row0, self._row = self._row, self._row + rows
         self.motions += n
         waits, state.waits = state.waits, False
-        return PlainRun(
-            data=self._data, text_at=begin, text_end=at, row0=row0, plain=room.take(0, n), state=deepcopy(state),
+        return LinearRun(
+            data=self._data, text_at=begin, text_end=at, row0=row0, linear=room.take(0, n), state=deepcopy(state),
             waits=waits,
         )  # fmt: skip
 
@@ -244,7 +244,7 @@ class Runs:
 
 
 class _InterpretedLines:
-    """Collects the lines of an odd run."""
+    """Collects the lines of an interpreted run."""
 
     def __init__(self) -> None:
         self.lines: list[bytes] = []

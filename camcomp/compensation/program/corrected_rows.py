@@ -122,8 +122,8 @@ def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
     programmed = (rows.w - w0) * track.length[rows.piece]
     commanded = arcs_out.lengths(start, rows.end, rows.arcs, program.path.axis[rows.motion])
     scale = np.divide(commanded, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
-    plain = rows.joining | ((rows.kind != LINE) & ~rows.arcs.on) | ~rows.corrected | (programmed < 0.01)
-    return np.where(plain, feed, feed * np.clip(scale, 0.2, 5.0))
+    unscaled = rows.joining | ((rows.kind != LINE) & ~rows.arcs.on) | ~rows.corrected | (programmed < 0.01)
+    return np.where(unscaled, feed, feed * np.clip(scale, 0.2, 5.0))
 
 
 def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Output:

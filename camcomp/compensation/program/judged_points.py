@@ -116,10 +116,10 @@ def _see_oriented(job: Job, points: JudgedPoints, told: Floats, orienting: Orien
     row, travel = points.row, commanded_travel(points, orienting, words)
     assert travel.rotation is not None
     tip, state = respond(job, told, travel, points.target, before=points.before)
-    wanted = points.travel.rotation
-    if wanted is None:
-        wanted = np.broadcast_to(job.machine.nominal.held_rotation, (len(row), 3, 3))
-    return _seen(points, tip, state, orienting.tilt(travel.rotation, state, wanted))
+    programmed = points.travel.rotation
+    if programmed is None:
+        programmed = np.broadcast_to(job.machine.nominal.held_rotation, (len(row), 3, 3))
+    return _seen(points, tip, state, orienting.tilt(travel.rotation, state, programmed))
 
 
 def _seen(points: JudgedPoints, tip: Floats, state: Correction, tilt: Floats | None = None) -> Seen:

@@ -45,10 +45,10 @@ def row_layout(path: Path, track: Track, step: Floats, resolution: float) -> Lay
     """
     corrected = corrected_pieces(path, track)
     feed = corrected & (path.kind[track.motion] != RAPID)
-    wanted = track.jump & np.concatenate(([False], corrected[:-1])) & (step > resolution)
+    jumps = track.jump & np.concatenate(([False], corrected[:-1])) & (step > resolution)
     behind_uncorrected = np.concatenate(([True], ~corrected[:-1])) & (step > resolution)
-    leading = (wanted | behind_uncorrected) & feed
-    trailing = np.concatenate((wanted[1:] & ~leading[1:], [False])) & feed
+    leading = (jumps | behind_uncorrected) & feed
+    trailing = np.concatenate((jumps[1:] & ~leading[1:], [False])) & feed
     return Layout(corrected, leading, trailing)
 
 

@@ -91,23 +91,23 @@ class Orienting:
 
     def _held_back(self, target: Floats, travel: Travel, found: Correction, words: Floats) -> Floats | None:
         """Words (n, 3) that cancel the tilt by effects in drives and structure; None where the tilt is negligible."""
-        told, wanted = self.platform(words), travel.rotation
-        if wanted is None:
-            wanted = np.broadcast_to(self.job.machine.nominal.held_rotation, told.shape)
+        told, requested = self.platform(words), travel.rotation
+        if requested is None:
+            requested = np.broadcast_to(self.job.machine.nominal.held_rotation, told.shape)
         _, state = respond(self.job.correctable, found.commanded, _told(travel, told), target)
         on = np.flatnonzero(state.status == 0)
-        if not np.nan_to_num(self.tilt(told, state, wanted)).max(initial=0.0) > 0.5 * TILT_RAD:
+        if not np.nan_to_num(self.tilt(told, state, requested)).max(initial=0.0) > 0.5 * TILT_RAD:
             return None
         loaded = np.array([exp_rotation(each) for each in state.tilt[on]]).reshape(-1, 3, 3) @ told[on]
         out = words.copy()
-        out[on] = platform_words(self.job, self.form, wanted[on] @ loaded.transpose(0, 2, 1) @ told[on], words[on])
+        out[on] = platform_words(self.job, self.form, requested[on] @ loaded.transpose(0, 2, 1) @ told[on], words[on])
         return out
 
     def told(self, travel: Travel, words: Floats) -> Travel:
         """The travel with the orientation that words (n, 3) say."""
         return _told(travel, self.platform(words))
 
-    def tilt(self, told: Floats, state: Correction, wanted: Floats) -> Floats:
+    def tilt(self, told: Floats, state: Correction, requested: Floats) -> Floats:
         """Angles (k,) rad of the loaded platform to the programmed orientations (k, 3, 3); NaN without a solution.
 
         Of the tool's axis alone where words say no more.
@@ -116,11 +116,11 @@ class Orienting:
         on = np.flatnonzero(state.status == 0)
         loaded = np.array([exp_rotation(each) for each in state.tilt[on]]).reshape(-1, 3, 3) @ told[on]
         if self.form == VECTOR:
-            one, other = loaded[:, :, 2], wanted[on][:, :, 2]
+            one, other = loaded[:, :, 2], requested[on][:, :, 2]
             sine = np.linalg.norm(np.cross(one, other), axis=1)
             out[on] = np.arctan2(sine, np.einsum("ni,ni->n", one, other))
         else:
-            out[on] = tilts(loaded, wanted[on])
+            out[on] = tilts(loaded, requested[on])
         return out
 
     def kept(self, track: Track, nodes: Nodes, words: Floats) -> Bools:

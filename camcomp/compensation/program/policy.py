@@ -85,8 +85,8 @@ def shares_of(job: Job, track: Track) -> Shares | None:
     piece, w = nodes.piece[on], nodes.w[on]
     target, travel = track.points(piece, w), travel_of(job, track, piece, w)
     aimed = aim_at(job, target, travel, "newton")
-    tip, plain = respond(job, target, travel)
-    solved = (aimed.status == 0) & (plain.status == 0)
+    tip, loaded = respond(job, target, travel)
+    solved = (aimed.status == 0) & (loaded.status == 0)
     if not solved.all():  # told with its line when the program is corrected
         return None
     moves = Uncertainty(job, track).moves(

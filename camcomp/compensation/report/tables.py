@@ -13,7 +13,7 @@ import numpy as np
 
 from camcomp.compensation.program.compensate import Compensated, Trajectories
 from camcomp.compensation.totals import JointRows, Totals
-from camcomp.gcode.plain_rows import csv_rows
+from camcomp.gcode.linear_rows import csv_rows
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError
 from camcomp.model.job import Job

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from camcomp.gcode.interpret import read_program
+from camcomp.gcode.linear_lines import MORE, NOT_LINEAR, LinearMotions, scan
+from camcomp.gcode.linear_rows import MAX_ROW_BYTES, put_decimal, put_feed, write_rows
 from camcomp.gcode.numbers import decimals, plain, significant
 from camcomp.gcode.output import Output
-from camcomp.gcode.plain_lines import MORE, NOT_PLAIN, PlainMotions, scan
-from camcomp.gcode.plain_rows import MAX_ROW_BYTES, put_decimal, put_feed, write_rows
 from camcomp.gcode.rewrite import rewrite
 from camcomp.ground.datatypes import LINE, RAPID
 
@@ -30,7 +30,7 @@ def scanned(
 ):
     """(motions, rows, index, reason, code, feed, ...) and the arrays of a scan."""
     data = np.frombuffer(text.encode("latin-1"), np.uint8)
-    room = PlainMotions.room(1000)
+    room = LinearMotions.room(1000)
     place = np.array(position)
     found = scan(
         data, 0, len(data), last, code, feed, False, False, place, unit, np.array(offset), pointed, top, room, 1000
@@ -92,21 +92,21 @@ def test_inches_and_offsets():
 )  # fmt: skip
 def test_everything_else_is_odd(line):
     (n, rows, at, why, *_), _ = scanned(f"G1 X2\n{line}\nX3\n")
-    assert (n, rows, at, why) == (1, 1, 6, NOT_PLAIN)
+    assert (n, rows, at, why) == (1, 1, 6, NOT_LINEAR)
 
 
 def test_odd_without_a_motion_code_or_a_feed():
-    assert scanned("X1\n", code=-1)[0][3] == NOT_PLAIN
-    assert scanned("G1 X1\n", feed=0.0)[0][3] == NOT_PLAIN
+    assert scanned("X1\n", code=-1)[0][3] == NOT_LINEAR
+    assert scanned("G1 X1\n", feed=0.0)[0][3] == NOT_LINEAR
     assert scanned("G0 X1\n", feed=0.0)[0][0] == 1
 
 
 def test_numbers_without_a_point_can_be_odd():
-    assert scanned("X1.\nX0\nX5\n", pointed=True)[0][:4] == (2, 2, 7, NOT_PLAIN)
+    assert scanned("X1.\nX0\nX5\n", pointed=True)[0][:4] == (2, 2, 7, NOT_LINEAR)
 
 
 def test_a_cut_across_the_top_of_the_stock_is_odd():
-    assert scanned("G1 X2\nG0 Z-1\nG1 X3\nZ2\n", top=1.5)[0][:4] == (3, 3, 19, NOT_PLAIN)
+    assert scanned("G1 X2\nG0 Z-1\nG1 X3\nZ2\n", top=1.5)[0][:4] == (3, 3, 19, NOT_LINEAR)
 
 
 @pytest.mark.parametrize("cut", range(1, 12))

@@ -8,12 +8,12 @@ import pytest
 
 from camcomp.compensation.long import runs
 from camcomp.compensation.long.field import Field
-from camcomp.compensation.long.plain_run import NotInPieces
+from camcomp.compensation.long.linear_run import NotInPieces
 from camcomp.compensation.long.program import LongProgram
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.result import BOUND_UM
 from camcomp.compensation.totals import Totals
-from camcomp.gcode.plain_rows import csv_rows
+from camcomp.gcode.linear_rows import csv_rows
 from camcomp.gcode.stamp import is_stamped
 from camcomp.ground.errors import CheckFailed, PhysicsError, ProgramError
 from camcomp.ground.files import shipped

@@ -41,7 +41,7 @@ def compiled_into(function, seen):
 
 
 def test_there_are_kernels():
-    assert {path.stem for path in FILES} >= {"plain_lines", "plain_rows", "kernel", "gradients", "sweep"}
+    assert {path.stem for path in FILES} >= {"linear_lines", "linear_rows", "kernel", "gradients", "sweep"}
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

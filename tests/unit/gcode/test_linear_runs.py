@@ -6,7 +6,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from camcomp.gcode import flow, plain_reader, rewrite
+from camcomp.gcode import flow, linear_reader, rewrite
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.output import Output
 from camcomp.ground.datatypes import ARC, LINE, RAPID
@@ -50,8 +50,8 @@ def columns(read):
 
 def read_with(monkeypatch, rows, data):
     monkeypatch.setattr(flow, "MIN_ROWS", rows)
-    monkeypatch.setattr(plain_reader, "MIN_RUN", 1)
-    monkeypatch.setattr(plain_reader, "MAX_PAUSE", 0)
+    monkeypatch.setattr(linear_reader, "MIN_RUN", 1)
+    monkeypatch.setattr(linear_reader, "MAX_PAUSE", 0)
     try:
         return columns(read_program(data, name="p.nc", dialect="rs274"))
     except CamcompError as error:

@@ -7,15 +7,15 @@ from functools import cached_property
 
 import numpy as np
 
+from camcomp.gcode.linear_rows import MAX_ROW_BYTES, write_rows
 from camcomp.gcode.numbers import FEED_DIGITS
 from camcomp.gcode.output import Output
-from camcomp.gcode.plain_rows import MAX_ROW_BYTES, write_rows
-from camcomp.gcode.program import LETTERS, PLAIN_LETTERS, Program
+from camcomp.gcode.program import LETTERS, LINEAR_LETTERS, Program
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 
 TIE = 1e-6  # of the last digit: nearer to a tie than this, two ways of rounding may differ
-_PLAIN = [LETTERS.index(each) for each in PLAIN_LETTERS]
-_OTHER = [k for k in range(len(LETTERS)) if k not in _PLAIN]
+_LINEAR = [LETTERS.index(each) for each in LINEAR_LETTERS]
+_OTHER = [k for k in range(len(LETTERS)) if k not in _LINEAR]
 _NO_MODE = np.zeros(0, np.uint8)
 
 
@@ -31,7 +31,7 @@ class WrittenRun:
     feed: float | None  # mm/min
 
 
-class PlainWriter:
+class LinearWriter:
     """Finds the runs of one program and its output, and writes them."""
 
     def __init__(self, program: Program, out: Output, resolution_mm: float, bounds: Ints) -> None:
@@ -47,12 +47,12 @@ class PlainWriter:
         out = np.arange(n)
         if not n or self.program.text.codec != "latin-1" or self.out.words is not None:
             return out
-        plain = self._plain()
+        linear = self._linear()
         assert self.out.rest is not None and self.out.apart is not None
         modes = np.array([id(each) for each in self.program.modes])
         keys = (sites.unit, *sites.offset.T, modes, self.out.rest[rows], self.out.apart[rows])
-        fresh = ~plain
-        fresh[1:] |= ~plain[:-1]
+        fresh = ~linear
+        fresh[1:] |= ~linear[:-1]
         for each in keys:
             fresh[1:] |= each[1:] != each[:-1]
         for rebase in self.program.rebases:
@@ -61,32 +61,32 @@ class PlainWriter:
         begins = np.flatnonzero(fresh)
         ends = np.append(begins[1:], n)
         behind = np.repeat(ends, ends - begins)
-        return np.where(plain, behind, out)
+        return np.where(linear, behind, out)
 
-    def _plain(self) -> Bools:
+    def _linear(self) -> Bools:
         """Motions (n,) whose lines and rows the compiled writer knows."""
         program, out, sites, path = self.program, self.out, self.program.sites, self.program.path
         text, straight = program.text, (path.kind == RAPID) | (path.kind == LINE)
-        plain = path.known & ~path.machine & straight & (sites.code == (path.kind == LINE))
-        plain &= ~(sites.fixed | sites.relative | sites.stops | sites.modes_changed)
-        plain &= (
+        linear = path.known & ~path.machine & straight & (sites.code == (path.kind == LINE))
+        linear &= ~(sites.fixed | sites.relative | sites.stops | sites.modes_changed)
+        linear &= (
             (sites.feed_mode == 94) & (sites.feed_unit == sites.unit) & ~((path.kind == LINE) & np.isnan(path.feed))
         )
-        plain &= (sites.begin[:, _OTHER] < 0).all(axis=1) & (sites.begin[:, :3] >= 0).any(axis=1)
-        plain[1:] &= sites.row[1:] > sites.row[:-1]
-        plain &= (text.ends < text.nexts)[sites.row]
+        linear &= (sites.begin[:, _OTHER] < 0).all(axis=1) & (sites.begin[:, :3] >= 0).any(axis=1)
+        linear[1:] &= sites.row[1:] > sites.row[:-1]
+        linear &= (text.ends < text.nexts)[sites.row]
         if "/" in text.string:
-            rows = np.flatnonzero(plain)
-            plain[rows] = [not text.line(row).lstrip(" \t").startswith("/") for row in sites.row[rows].tolist()]
+            rows = np.flatnonzero(linear)
+            linear[rows] = [not text.line(row).lstrip(" \t").startswith("/") for row in sites.row[rows].tolist()]
         motion = out.motion
         assert out.rest is not None and out.apart is not None
         first = self.bounds[motion]
-        odd = (out.kind != path.kind[motion]) | (out.rest != out.rest[first]) | (out.apart != out.apart[first])
-        odd |= self._is_tied()
-        plain[motion[odd]] = False
-        own = np.zeros(len(plain), np.bool_)
+        other = (out.kind != path.kind[motion]) | (out.rest != out.rest[first]) | (out.apart != out.apart[first])
+        other |= self._is_tied()
+        linear[motion[other]] = False
+        own = np.zeros(len(linear), np.bool_)
         own[motion[~out.joining]] = True
-        return np.asarray(plain & own)
+        return np.asarray(linear & own)
 
     def _is_tied(self) -> Bools:
         """Rows (N,) with a number that lies half-way between two that can be written."""
@@ -124,7 +124,7 @@ class PlainWriter:
         state = np.array([-1.0 if code is None else float(code), np.nan if feed is None else feed])
         still = np.zeros(count, np.bool_)
         size = write_rows(
-            self._data, begin, end, lines, sites.begin[a:b][:, _PLAIN].copy(), sites.finish[a:b][:, _PLAIN].copy(),
+            self._data, begin, end, lines, sites.begin[a:b][:, _LINEAR].copy(), sites.finish[a:b][:, _LINEAR].copy(),
             path.kind[a:b].copy(), np.ascontiguousarray(path.end[a:b]), sites.code_stated[a:b].copy(), sites.feed_stated[a:b].copy(),
             sites.modal_feed[a:b].copy(), self.bounds[a : b + 1] - self.bounds[a], self.out.joining[own].copy(), still, 0,
             _NO_MODE, _NO_MODE, self.out.end[own].copy(), self.out.feed[own].copy(), place, state, unit, sites.offset[a].copy(),

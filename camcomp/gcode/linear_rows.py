@@ -1,6 +1,6 @@
-"""Writes plain lines with other end points, compiled: byte for byte what rewrite.py writes for such lines.
+"""Writes linear moves with other end points, compiled: byte for byte what rewrite.py writes for such lines.
 
-The control is followed through the output: position after rounding, motion code, feed. Between runs of plain lines the
+The control is followed through the output: position after rounding, motion code, feed. Between runs of linear moves the
 caller carries these on.
 """
 
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.gcode.plain_lines import F, G
+from camcomp.gcode.linear_lines import F, G
 from camcomp.ground.compiled import entry, inner
 from camcomp.ground.datatypes import RAPID, Floats, Ints
 
@@ -26,7 +26,7 @@ _TENS = 10 ** np.arange(18)
 
 @inner
 def put_decimal(out, at, value, digits, point):
-    """Writes `value` rounded to `digits` decimals as numbers.plain does; the index behind it."""
+    """Writes `value` rounded to `digits` decimals as numbers.linear does; the index behind it."""
     scaled = np.rint(value * _TENS[digits])
     negative = scaled < 0.0
     whole = np.int64(abs(scaled))
@@ -105,7 +105,7 @@ def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed,
     """The bytes text_at..text_end of `data`, which hold n motions, with N rows in their place.
 
     lines (n, 3), begin and finish (n, 5), kind (n,), programmed (n, 3) mm, program_feed (n,): see
-    plain_lines.PlainMotions.
+    linear_lines.LinearMotions.
     first (n + 1,): rows of every motion. joining (N,), rest (N,): ends at rest; at_rest, on: bytes of the
     lines in front of such rows and of the next that is none (begins -1: of the first in any case, else 0), wanted (N, 3) mm, feed (N,) mm/min (NaN: as programmed).
     position (3,) mm and state (2,) = motion code in force (-1 unknown), feed in force (NaN unknown):

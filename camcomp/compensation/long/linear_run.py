@@ -1,4 +1,4 @@
-"""A run of plain lines of a long program: its bytes, its motions, and the control behind it."""
+"""A run of linear moves of a long program: its bytes, its motions, and the control behind it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.gcode.plain_lines import PlainMotions
+from camcomp.gcode.linear_lines import LinearMotions
 from camcomp.gcode.state import ControlState
 from camcomp.ground.datatypes import RAPID, Floats, Ints, Path
 
@@ -25,59 +25,59 @@ class Unsolved(Exception):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PlainRun:
-    """Plain lines: bytes text_at to text_end of `data`."""
+class LinearRun:
+    """Linear moves: bytes text_at to text_end of `data`."""
 
     data: np.ndarray
     text_at: int
     text_end: int
     row0: int  # lines of the program before it
-    plain: PlainMotions
+    linear: LinearMotions
     state: ControlState  # behind it; position, motion and feed as at its end
     waits: bool  # the control waits for something in front of it
 
     @property
     def motions(self) -> int:
         """Number of motions."""
-        return len(self.plain.row)
+        return len(self.linear.row)
 
     def path(self) -> Path:
         """The motions as a path."""
-        plain, n, state = self.plain, self.motions, self.state
+        linear, n, state = self.linear, self.motions, self.state
         return Path(
-            line=plain.row + self.row0 + 1, kind=plain.kind, start=plain.start, end=plain.end, centre=np.full((n, 3), np.nan),
-            axis=np.zeros((n, 3)), angle=np.zeros(n), feed=np.where(plain.kind == RAPID, np.nan, plain.feed),
+            line=linear.row + self.row0 + 1, kind=linear.kind, start=linear.start, end=linear.end, centre=np.full((n, 3), np.nan),
+            axis=np.zeros((n, 3)), angle=np.zeros(n), feed=np.where(linear.kind == RAPID, np.nan, linear.feed),
             speed=np.full(n, state.speed), turn=np.full(n, state.sense), tool=np.full(n, state.tool),
             known=np.ones(n, np.bool_), machine=np.zeros(n, np.bool_),
         )  # fmt: skip
 
-    def parts(self, of: Ints, start: Floats, end: Floats) -> PlainRun:
+    def parts(self, of: Ints, start: Floats, end: Floats) -> LinearRun:
         """A run of parts (n,) of these motions, from start (n, 3) to end (n, 3)."""
-        plain = PlainMotions(*(each[of] for each in self.plain))  # type: ignore[arg-type]
-        return replace(self, plain=plain._replace(start=start, end=end))
+        linear = LinearMotions(*(each[of] for each in self.linear))  # type: ignore[arg-type]
+        return replace(self, linear=linear._replace(start=start, end=end))
 
     def before(self, motion: int) -> ControlState:
         """The control in front of a motion."""
         state = deepcopy(self.state)
-        state.position = self.plain.start[motion].tolist()
-        state.motion = 10 * int(self.plain.kind[motion])
-        feed = float(self.plain.feed[motion])
+        state.position = self.linear.start[motion].tolist()
+        state.motion = 10 * int(self.linear.kind[motion])
+        feed = float(self.linear.feed[motion])
         state.feed = None if np.isnan(feed) else feed
         return state
 
     def text_of(self, motion: int) -> bytes:
         """The line of a motion with its end of line."""
-        a, b, c = self.plain.line[motion]
+        a, b, c = self.linear.line[motion]
         return self.data[a:c].tobytes() if c > b else self.data[a:b].tobytes() + b"\n"
 
     def text_from(self, motion: int) -> bytes:
         """The lines from that of a motion on."""
-        return self.data[self.plain.line[motion, 0] : self.text_end].tobytes()
+        return self.data[self.linear.line[motion, 0] : self.text_end].tobytes()
 
     def text_until(self, motion: int) -> bytes:
         """The lines up to that of a motion."""
-        return self.data[self.text_at : self.plain.line[motion, 2]].tobytes()
+        return self.data[self.text_at : self.linear.line[motion, 2]].tobytes()
 
     def row_of(self, motion: int) -> int:
         """Lines of the program before that of a motion."""
-        return self.row0 + int(self.plain.row[motion])
+        return self.row0 + int(self.linear.row[motion])

@@ -1,6 +1,6 @@
-"""Plain lines, compiled: nothing but N, G0 or G1, X, Y, Z and F, each once, with plain numbers.
+"""Linear moves, compiled: nothing but N, G0 or G1, X, Y, Z and F, each once, with plain numbers.
 
-Most lines of long programs are of this kind. Whatever else stands in a line makes it an odd one, left to the interpreter;
+Most lines of long programs are of this kind. Whatever else stands in a line leaves it to the interpreter;
 so does a number that this reader could read differently from it in the last bit.
 """
 
@@ -16,21 +16,21 @@ import numpy as np
 from camcomp.ground.compiled import entry
 from camcomp.ground.datatypes import LINE, RAPID, Floats, Ints
 
-# Columns of PlainMotions.begin and Plain.finish.
+# Columns of LinearMotions.begin and LinearMotions.finish.
 X, Y, Z, F, G = range(5)
-NOT_PLAIN, FULL, MORE, END = (
+NOT_LINEAR, FULL, MORE, END = (
     0,
     1,
     2,
     3,
-)  # why a scan stopped: a line that is no plain motion, no room, the buffer ends within a line, the end
+)  # why a scan stopped: a line that is no linear motion, no room, the buffer ends within a line, the end
 LONGEST_END = 4  # bytes of an end of line, CR CR CR LF; see text.END_OF_LINE
 _LARGEST_WORD = 1.0e7  # mm, as the interpreter has it
 _POWERS = 10.0 ** np.arange(23)
 
 
-class PlainMotions(NamedTuple):
-    """Motions of consecutive plain lines, n of them."""
+class LinearMotions(NamedTuple):
+    """Motions of consecutive linear moves, n of them."""
 
     row: Ints  # (n,) line, counted from the first line of the scan
     line: Ints  # (n, 3) index in the buffer of the line's begin, its end, and behind its end of line
@@ -44,18 +44,18 @@ class PlainMotions(NamedTuple):
     feed_stated: np.ndarray
 
     @staticmethod
-    def room(n: int) -> PlainMotions:
+    def room(n: int) -> LinearMotions:
         """Arrays for n motions."""
-        return PlainMotions(
+        return LinearMotions(
             row=np.empty(n, np.int64), line=np.empty((n, 3), np.int64), begin=np.empty((n, 5), np.int64),
             finish=np.empty((n, 5), np.int64), kind=np.empty(n, np.int8), start=np.empty((n, 3)),
             end=np.empty((n, 3)), feed=np.empty(n), code_stated=np.empty(n, np.bool_),
             feed_stated=np.empty(n, np.bool_),
         )  # fmt: skip
 
-    def take(self, a: int, b: int) -> PlainMotions:
+    def take(self, a: int, b: int) -> LinearMotions:
         """Motions a to b, as views."""
-        return PlainMotions(*(each[a:b] for each in self))  # type: ignore[arg-type]
+        return LinearMotions(*(each[a:b] for each in self))  # type: ignore[arg-type]
 
 
 def scan(*args: Any) -> tuple[Any, ...]:
@@ -67,10 +67,10 @@ def scan(*args: Any) -> tuple[Any, ...]:
 @entry
 def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, position, unit, offset, pointed, top, out, limit,
                begin, finish, value):  # fmt: skip
-    """Reads plain lines from index `at` of the bytes `data` (up to `stop`) into `out`, at most `limit` motions.
+    """Reads linear moves from index `at` of the bytes `data` (up to `stop`) into `out`, at most `limit` motions.
 
     last: the file ends at `stop`. code: 0, 1 or -1 (none of them in force), feed in force (0: none), position (3,) mm,
-    unit mm, offset (3,) mm. pointed: numbers without a point are odd. top: so is a cut from one side of
+    unit mm, offset (3,) mm. pointed: numbers without a point are left to the interpreter. top: so is a cut from one side of
     this height to the other, mm; NaN: there is none. Returns (motions, rows, index, reason, code, feed,
     code_stated, feed_stated); `position` is moved along. begin, finish, value (5,): room to work in.
     """
@@ -82,7 +82,7 @@ def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, posit
         for k in range(5):
             begin[k] = -1
         i = at
-        plain = True
+        linear = True
         first = True
         while True:
             if i >= stop:
@@ -124,11 +124,11 @@ def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, posit
             if i >= stop and not last:
                 return n, row, at, MORE, code, feed, code_stated, feed_stated
             if digits == 0 or digits > 15:
-                plain = False
+                linear = False
                 break
             if letter == 78:  # N
                 if not first or point or negative:
-                    plain = False
+                    linear = False
                     break
                 first = False
                 continue
@@ -141,24 +141,24 @@ def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, posit
             elif letter == 71:
                 k = G
             if k < 0 or begin[k] >= 0 or (k == G and (point or negative or mantissa > 1)):
-                plain = False
+                linear = False
                 break
             if k < 3 and pointed and not point and mantissa != 0:
-                plain = False
+                linear = False
                 break
             # `X1 0` is one number or two: the interpreter refuses it
             j = i
             while j < stop and (data[j] == 32 or data[j] == 9):
                 j += 1
             if j < stop and (48 <= data[j] <= 57 or data[j] == 46 or data[j] == 44 or data[j] == 43 or data[j] == 45):
-                plain = False
+                linear = False
                 break
             begin[k] = here
             finish[k] = i
             number = mantissa / _POWERS[decimals]
             value[k] = -number if negative else number
-        if not plain:
-            return n, row, at, NOT_PLAIN, code, feed, code_stated, feed_stated
+        if not linear:
+            return n, row, at, NOT_LINEAR, code, feed, code_stated, feed_stated
         eol = i
         if i < stop and data[i] == 13:
             while i < stop and data[i] == 13 and i - eol < LONGEST_END:
@@ -182,17 +182,17 @@ def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, posit
             speed = value[F] * unit
             fed = True
             if not speed > 0.0:
-                return n, row, at, NOT_PLAIN, code, feed, code_stated, feed_stated
+                return n, row, at, NOT_LINEAR, code, feed, code_stated, feed_stated
         moves = begin[X] >= 0 or begin[Y] >= 0 or begin[Z] >= 0
         if moves and (now < 0 or (now == 1 and not speed > 0.0)):
-            return n, row, at, NOT_PLAIN, code, feed, code_stated, feed_stated
+            return n, row, at, NOT_LINEAR, code, feed, code_stated, feed_stated
         if moves:
             for k in range(3):
                 if begin[k] >= 0 and abs(value[k] * unit) > _LARGEST_WORD:
-                    return n, row, at, NOT_PLAIN, code, feed, code_stated, feed_stated
+                    return n, row, at, NOT_LINEAR, code, feed, code_stated, feed_stated
             height = value[Z] * unit + offset[Z] if begin[Z] >= 0 else position[Z]
             if now == 1 and (position[Z] < top) != (height < top):
-                return n, row, at, NOT_PLAIN, code, feed, code_stated, feed_stated
+                return n, row, at, NOT_LINEAR, code, feed, code_stated, feed_stated
             for k in range(3):
                 out.start[n, k] = position[k]
                 if begin[k] >= 0:

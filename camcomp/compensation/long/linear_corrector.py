@@ -1,4 +1,4 @@
-"""A run of plain lines corrected by interpolation, as compensate.py corrects it exactly, and written."""
+"""A run of linear moves corrected by interpolation, as compensate.py corrects it exactly, and written."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.bands.scatter import best_share, excess
 from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import follow
+from camcomp.compensation.long.linear_run import LinearRun, NotInPieces, Unsolved
 from camcomp.compensation.long.loads import Loads, RunContext, joints_at, loads_of
 from camcomp.compensation.long.output_state import OutputState
-from camcomp.compensation.long.plain_run import NotInPieces, PlainRun, Unsolved
 from camcomp.compensation.long.run_bands import RunUncertainty
 from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
@@ -20,7 +20,7 @@ from camcomp.compensation.program.moves import chord_budget
 from camcomp.compensation.program.policy import left_alone
 from camcomp.compensation.program.under_control import apart_pays, merging, rests_of, rounds
 from camcomp.gcode.dialect import Dialect
-from camcomp.gcode.plain_rows import MAX_ROW_BYTES, write_rows
+from camcomp.gcode.linear_rows import MAX_ROW_BYTES, write_rows
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 from camcomp.model.control import limits_of
 from camcomp.model.job import Job
@@ -39,7 +39,7 @@ COARSE_MM = 1e-3  # a control with larger steps moves the joints by more than fi
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PlainRows:
+class LinearRows:
     """End points (N,) of the corrected run, in order; program frame."""
 
     move: Ints
@@ -68,8 +68,8 @@ class CorrectedRun:
     """A corrected run."""
 
     data: bytes
-    run: PlainRun  # the moves that the rows count
-    rows: PlainRows
+    run: LinearRun  # the moves that the rows count
+    rows: LinearRows
     answers: Answers
     commanded: Floats  # (N, 3) mm before rounding, program frame
     written: Floats  # (N, 3) mm
@@ -95,7 +95,7 @@ class Middles:
 
     rows: Ints  # the end point of the line
     move: Ints
-    wanted: Floats  # (k, 3) mm to be commanded there, program frame
+    aimed: Floats  # (k, 3) mm to be commanded there, program frame
     share: Floats  # (k,) of the correction
     answers: Answers
 
@@ -104,8 +104,8 @@ def _sizes(vectors: Floats) -> Floats:
     return np.asarray(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)))
 
 
-class PlainCorrector:
-    """Corrects runs of plain lines of one program."""
+class LinearCorrector:
+    """Corrects runs of linear moves of one program."""
 
     def __init__(self, job: Job, tolerance_um: float, language: Dialect, feed_point: bool) -> None:
         """language, feed_point: how it is written. Raises NotInPieces for what needs the program as a whole."""
@@ -118,15 +118,15 @@ class PlainCorrector:
         self.field: Field | None = None
         self.exact = 0  # rows that had to be solved one by one
 
-    def correct(self, context: RunContext, carry: OutputState) -> CorrectedRun:
-        """The run corrected and written; `carry` is moved along. Raises Unsolved, NotInPieces."""
+    def correct(self, context: RunContext, output: OutputState) -> CorrectedRun:
+        """The run corrected and written; `output` is moved along. Raises Unsolved, NotInPieces."""
         loads = loads_of(context, self.job)
         try:
-            return self._corrected(context, loads, carry)
+            return self._corrected(context, loads, output)
         except Unsolved as error:
             raise Unsolved(loads.motion[error.move], error.target, error.status) from None
 
-    def _corrected(self, context: RunContext, loads: Loads, carry: OutputState) -> CorrectedRun:
+    def _corrected(self, context: RunContext, loads: Loads, output: OutputState) -> CorrectedRun:
         run = loads.run
         uncertainty = RunUncertainty(self.job, context) if self.job.config.uncertain else None
         policy = self.job.config.compensation.policy if uncertainty is not None else "full"
@@ -135,27 +135,27 @@ class PlainCorrector:
             loads = self._left_lines(run, loads, uncertainty)
         lead, trail = joints_at(loads, context.before, context.after)
         tolerance = np.full(run.motions, self.budget)
-        hard = (loads.length > EASY_MM) & (run.plain.kind == LINE)
+        hard = (loads.length > EASY_MM) & (run.linear.kind == LINE)
         for left in range(ROUNDS, 0, -1):
             rows = self._rows(run=run, loads=loads, lead=lead, trail=trail, hard=hard, tolerance=tolerance)
             answers = self.ask(rows.move, rows.target, rows.force)
             commanded, kept, share = self._commanded(rows, answers, loads.motion, uncertainty, policy)
-            if left == ROUNDS and self._drop_small_joints(rows, commanded, carry, lead, trail):
+            if left == ROUNDS and self._drop_small_joints(rows, commanded, output, lead, trail):
                 continue
             middles = self._middles(run, loads, rows, share)
-            told = self._halfway(commanded, carry.commanded)[middles.rows] - middles.wanted
+            told = self._halfway(commanded, output.commanded)[middles.rows] - middles.aimed
             bent = (_sizes(told) > self.budget) & ~hard[middles.move]
             if bent.any() and left > 1:
                 hard[middles.move[bent]] = True
                 continue
-            trial = replace(carry)
+            trial = replace(output)
             data, written, held, rest = self._write(
-                run=context.run, loads=loads, rows=rows, commanded=commanded, kept=kept, carry=trial
+                run=context.run, loads=loads, rows=rows, commanded=commanded, kept=kept, output=trial
             )
             judged = self._judged(run, rows)
             error = self._after(
                 rows, judged, answers=answers, middles=middles, commanded=commanded, written=written,
-                first=carry.written,
+                first=output.written,
             )  # fmt: skip
             worst = np.zeros(run.motions)
             at = np.concatenate((rows.move[judged], middles.move))
@@ -166,8 +166,8 @@ class PlainCorrector:
             hard |= missed
             shrink = np.clip(0.9 * self.tolerance / np.maximum(worst, 1e-300), 0.3, 0.9)
             tolerance = np.where(missed, tolerance * shrink, tolerance)
-        begin = carry.written
-        carry.__dict__.update(trial.__dict__)
+        begin = output.written
+        output.__dict__.update(trial.__dict__)
         meant, bands = None, None
         if share is not None:
             meant = self._left(judged, answers, middles, share)
@@ -180,10 +180,10 @@ class PlainCorrector:
             data=data, run=run, rows=rows, answers=answers, commanded=commanded, written=written, after=error,
             before=self._back(np.concatenate((answers.unloaded[judged], middles.answers.unloaded))), begin=begin, feed=held,
             rest=rest, seen=np.concatenate((np.flatnonzero(judged), middles.rows)), bands=bands, left=meant,
-            apart=bool(carry.apart),
+            apart=bool(output.apart),
         )  # fmt: skip
 
-    def _set_up(self, run: PlainRun, loads: Loads) -> None:
+    def _set_up(self, run: LinearRun, loads: Loads) -> None:
         """Set resolution and chord budget of a run; make the field of corrections on the first run."""
         if self.field is None:
             force = self.job.frame.vectors(np.concatenate((loads.first, loads.last)))
@@ -192,7 +192,7 @@ class PlainCorrector:
         self.budget = float(chord_budget(np.array(self.tolerance), self.resolution))
 
     def _bands(
-        self, uncertainty: RunUncertainty, rows: PlainRows, *, answers: Answers, judged: Bools, error: Floats,
+        self, uncertainty: RunUncertainty, rows: LinearRows, *, answers: Answers, judged: Bools, error: Floats,
         written: Floats, share: Floats | None,
     ) -> Bands:  # fmt: skip
         moves = uncertainty.moves(written, rows.move, rows.w, rows.force, rows.joining & (rows.w > 0.0))
@@ -212,18 +212,18 @@ class PlainCorrector:
         between = (1.0 - middles.share)[:, None] * middles.answers.unloaded
         return self._back(np.concatenate((ends, between)))
 
-    def _left_lines(self, run: PlainRun, loads: Loads, uncertainty: RunUncertainty) -> Loads:
+    def _left_lines(self, run: LinearRun, loads: Loads, uncertainty: RunUncertainty) -> Loads:
         """Add load jumps where uncorrected lines meet corrected ones; mark the uncorrected lines for `_commanded`."""
-        n, plain = run.motions, run.plain
+        n, linear = run.motions, run.linear
         fresh = loads.jump[:-1].copy()  # the other lines begin as the line before ends
         fresh[0] = True
-        fresh[1:] |= (plain.start[1:] != plain.end[:-1]).any(axis=1)
+        fresh[1:] |= (linear.start[1:] != linear.end[:-1]).any(axis=1)
         at = np.flatnonzero(fresh)
         moves, w = np.concatenate((at, np.arange(n))), np.repeat([0.0, 1.0], (len(at), n))
         order = np.lexsort((w, moves))
         moves, w = moves[order], w[order]
         ends = w == 1.0
-        target = np.where(ends[:, None], plain.end[moves], plain.start[moves])
+        target = np.where(ends[:, None], linear.end[moves], linear.start[moves])
         force = np.where(ends[:, None], loads.last[moves], loads.first[moves])
         answers = self.ask(moves, target, force, every=False)
         there = uncertainty.moves(
@@ -237,9 +237,9 @@ class PlainCorrector:
     # --- rows ----------------------------------------------------------------------------------------------------
 
     def _rows(
-        self, run: PlainRun, loads: Loads, lead: Bools, trail: Bools, hard: Bools, tolerance: Floats
-    ) -> PlainRows:
-        plain, n = run.plain, run.motions
+        self, run: LinearRun, loads: Loads, lead: Bools, trail: Bools, hard: Bools, tolerance: Floats
+    ) -> LinearRows:
+        linear, n = run.linear, run.motions
         move, w, shift = np.flatnonzero(~hard), None, None
         w, shift = np.ones(len(move)), np.zeros((len(move), 3))
         which = np.flatnonzero(hard)
@@ -254,21 +254,21 @@ class PlainCorrector:
         if len(move) > n or len(which):
             order = np.lexsort((w, kind, move))
             move, w, kind, shift = move[order], w[order], kind[order], shift[order]
-        target = plain.end[move]
+        target = linear.end[move]
         force = loads.last[move]
         inside = np.flatnonzero(w < 1.0)
         if len(inside):
-            start = plain.start[move[inside]]
+            start = linear.start[move[inside]]
             target[inside] = start + w[inside, None] * (target[inside] - start)
             force[inside] = loads.at(move[inside], w[inside])
         force[kind == 2] = 0.0
-        return PlainRows(
+        return LinearRows(
             move=move, w=w, joining=kind != 1, target=target, force=force, shift=shift, engagement=loads.sizes(move, w)
         )
 
-    def _divided(self, run: PlainRun, loads: Loads, which: Ints, tolerance: Floats) -> tuple[Ints, Floats, Floats]:
+    def _divided(self, run: LinearRun, loads: Loads, which: Ints, tolerance: Floats) -> tuple[Ints, Floats, Floats]:
         """Division points of some moves: move, w and shift of each."""
-        start, way = run.plain.start[which], run.plain.end[which] - run.plain.start[which]
+        start, way = run.linear.start[which], run.linear.end[which] - run.linear.start[which]
         length = loads.length[which]
         trial = trial_nodes(length, np.zeros(len(which)), np.ones(len(which), np.bool_))
         target = start[trial.piece] + trial.w[:, None] * way[trial.piece]
@@ -280,19 +280,19 @@ class PlainCorrector:
         return which[nodes.piece[inner]], nodes.w[inner], shift[inner]
 
     def _drop_small_joints(
-        self, rows: PlainRows, commanded: Floats, carry: OutputState, lead: Bools, trail: Bools
+        self, rows: LinearRows, commanded: Floats, output: OutputState, lead: Bools, trail: Bools
     ) -> bool:
         """Takes joining lines out that would be shorter than the resolution; whether there were any."""
         joins = np.flatnonzero(rows.joining)
-        previous = np.concatenate((carry.commanded[None], commanded[:-1]))[joins]
+        previous = np.concatenate((output.commanded[None], commanded[:-1]))[joins]
         small = _sizes(commanded[joins] - previous) <= self.resolution
         front = rows.w[joins] == 0.0
         lead[rows.move[joins[small & front]]] = False
         trail[rows.move[joins[small & ~front]]] = False
         return bool(small.any())
 
-    def _judged(self, run: PlainRun, rows: PlainRows) -> Bools:
-        out: Bools = (run.plain.kind[rows.move] == LINE) & ~rows.joining
+    def _judged(self, run: LinearRun, rows: LinearRows) -> Bools:
+        out: Bools = (run.linear.kind[rows.move] == LINE) & ~rows.joining
         return out
 
     # --- the machine ---------------------------------------------------------------------------------------------
@@ -319,7 +319,7 @@ class PlainCorrector:
         )  # fmt: skip
 
     def _commanded(
-        self, rows: PlainRows, answers: Answers, of: Ints, uncertainty: RunUncertainty | None, policy: str
+        self, rows: LinearRows, answers: Answers, of: Ints, uncertainty: RunUncertainty | None, policy: str
     ) -> tuple[Floats, Bools, Floats | None]:
         """Tips (N, 3) to be commanded, which rows (N,) stay as programmed, and the share (N,) of the correction, None: all of it.
 
@@ -367,11 +367,11 @@ class PlainCorrector:
 
     def _solved(self, move: Ints, target: Floats, force: Floats, every: bool) -> tuple[Floats, Floats]:
         aimed = solve(self.machine, TARGET, target, force=force)
-        plain = solve(self.machine, FREE, target, force=force)
-        bad = np.where(aimed.status != 0, aimed.status, plain.status)
+        linear = solve(self.machine, FREE, target, force=force)
+        bad = np.where(aimed.status != 0, aimed.status, linear.status)
         if bad.any():
             raise Unsolved(move[bad != 0], target[bad != 0], bad[bad != 0])
-        parts = [aimed.commanded - target, plain.tip - target]
+        parts = [aimed.commanded - target, linear.tip - target]
         if not every:
             return np.concatenate(parts, axis=1), np.empty((0, len(self.machine.actuators)))
         parts += [aimed.tilt, aimed.drive, aimed.rho - aimed.rho_nominal]
@@ -379,32 +379,32 @@ class PlainCorrector:
 
     # --- middles of lines ----------------------------------------------------------------------------------------
 
-    def _middles(self, run: PlainRun, loads: Loads, rows: PlainRows, share: Floats | None) -> Middles:
+    def _middles(self, run: LinearRun, loads: Loads, rows: LinearRows, share: Floats | None) -> Middles:
         """The middles of the lines that cut."""
         at = np.flatnonzero(self._judged(run, rows) & (loads.length[rows.move] > 0.0))
         move, w = rows.move[at], rows.w[at]
         same = (at > 0) & (rows.move[at - 1] == move)
         middle = 0.5 * (w + np.where(same, rows.w[at - 1], 0.0))
-        start = run.plain.start[move]
-        target = start + middle[:, None] * (run.plain.end[move] - start)
+        start = run.linear.start[move]
+        target = start + middle[:, None] * (run.linear.end[move] - start)
         answers = self.ask(move, target, loads.at(move, middle), every=False)
         taken = np.ones(len(at))
         if share is not None:
             taken = 0.5 * (share[at] + share[np.maximum(at - 1, 0)])
-        wanted = target + taken[:, None] * self._back(answers.correction)
-        return Middles(rows=at, move=move, wanted=wanted, share=taken, answers=answers)
+        aimed = target + taken[:, None] * self._back(answers.correction)
+        return Middles(rows=at, move=move, aimed=aimed, share=taken, answers=answers)
 
     def _halfway(self, ends: Floats, first: Floats) -> Floats:
         return 0.5 * (ends + np.concatenate((first[None], ends[:-1])))
 
     def _after(
-        self, rows: PlainRows, judged: Bools, *, answers: Answers, middles: Middles, commanded: Floats,
+        self, rows: LinearRows, judged: Bools, *, answers: Answers, middles: Middles, commanded: Floats,
         written: Floats, first: Floats,
     ) -> Floats:  # fmt: skip
         """Errors (k, 3) of the written program, program frame: end points that are judged, then middles."""
         R = self.job.frame.rotation
         off = (written - commanded + rows.shift)[judged]
-        told = self._halfway(written, first)[middles.rows] - middles.wanted
+        told = self._halfway(written, first)[middles.rows] - middles.aimed
         off = np.concatenate((off, told)) @ R.T  # from the exact command, machine frame
         error, ends = off.copy(), len(off) - len(told)
         follow(answers.tiles.slope, answers.tile[judged], off[:ends], error[:ends])
@@ -414,56 +414,56 @@ class PlainCorrector:
     # --- writing -------------------------------------------------------------------------------------------------
 
     def _write(
-        self, run: PlainRun, loads: Loads, rows: PlainRows, commanded: Floats, kept: Bools, carry: OutputState
+        self, run: LinearRun, loads: Loads, rows: LinearRows, commanded: Floats, kept: Bools, output: OutputState
     ) -> tuple[bytes, Floats, Floats, Bools]:
-        plain, N = run.plain, len(rows.move)
+        linear, N = run.linear, len(rows.move)
         rest, mode = self._rests(loads.run, rows), run.state.path_mode
         able = merging(mode, self.language)
-        apart = able and self._apart(run=loads.run, rows=rows, commanded=commanded, rest=rest, kept=kept, carry=carry)
-        begins = -1 if able and apart != carry.apart else 0
-        carry.apart = apart
+        apart = able and self._apart(run=loads.run, rows=rows, commanded=commanded, rest=rest, kept=kept, output=output)
+        begins = -1 if able and apart != output.apart else 0
+        output.apart = apart
         own = (mode.apart if apart else mode).said(run.state.unit)
         modes = [np.frombuffer(each.encode(), np.uint8) for each in (self.language.exact_stop, own)]
         first = np.searchsorted(loads.motion[rows.move], np.arange(run.motions + 1))
         out = np.empty(run.text_end - run.text_at + MAX_ROW_BYTES * (N + 1 + int(rest.sum())), np.uint8)
         written, held = np.empty((N, 3)), np.empty(N)
-        position, state = carry.written.copy(), np.array([carry.code, carry.feed])
+        position, state = output.written.copy(), np.array([output.code, output.feed])
         unit = run.state.unit
         size = write_rows(
-            run.data, run.text_at, run.text_end, plain.line, plain.begin, plain.finish, plain.kind, plain.end,
-            plain.code_stated, plain.feed_stated, plain.feed, first, rows.joining, rest, begins, *modes, commanded,
-            self._feeds(loads.run, rows, commanded, kept, carry),
+            run.data, run.text_at, run.text_end, linear.line, linear.begin, linear.finish, linear.kind, linear.end,
+            linear.code_stated, linear.feed_stated, linear.feed, first, rows.joining, rest, begins, *modes, commanded,
+            self._feeds(loads.run, rows, commanded, kept, output),
             position, state, unit, np.array(run.state.offset), self.language.digits(self.job.config.control.resolution_mm, unit),
             0.5 * self.resolution * (1.0 + 1e-9), self.feed_point, out, written, held,
         )  # fmt: skip
-        carry.written, carry.commanded = position, commanded[-1].copy()
-        carry.code, carry.feed = float(state[0]), float(state[1])
+        output.written, output.commanded = position, commanded[-1].copy()
+        output.code, output.feed = float(state[0]), float(state[1])
         return out[:size].tobytes(), written, held, rest
 
-    def _rests(self, run: PlainRun, rows: PlainRows) -> Bools:
+    def _rests(self, run: LinearRun, rows: LinearRows) -> Bools:
         """Rows (N,) at which an exact stop keeps a corner sharp; the last row of a run is never one."""
         if not rounds(run.state.path_mode, 1e3 * self.tolerance):
             return np.zeros(len(rows.move), np.bool_)
-        return rests_of((run.plain.kind[rows.move] == LINE) & ~rows.joining, rows.joining)
+        return rests_of((run.linear.kind[rows.move] == LINE) & ~rows.joining, rows.joining)
 
     def _apart(
-        self, run: PlainRun, rows: PlainRows, commanded: Floats, rest: Bools, kept: Bools, carry: OutputState
+        self, run: LinearRun, rows: LinearRows, commanded: Floats, rest: Bools, kept: Bools, output: OutputState
     ) -> bool:
         """Whether to forbid the controller to merge lines; changes of feed are not considered."""
-        kind, feed = run.plain.kind[rows.move], run.plain.feed[rows.move]
+        kind, feed = run.linear.kind[rows.move], run.linear.feed[rows.move]
         cut = (kind == LINE) & ~rows.joining & ~kept
-        start = np.concatenate((carry.commanded[None], commanded[:-1]))
+        start = np.concatenate((output.commanded[None], commanded[:-1]))
         moves = line_moves(kind, start, commanded, feed, run.state.path_mode)
         moves = replace(moves, exact=moves.exact | rest)
         return bool(cut.any()) and apart_pays(moves, cut, limits_of(self.job.config), 1e3 * self.tolerance)
 
-    def _feeds(self, run: PlainRun, rows: PlainRows, commanded: Floats, kept: Bools, carry: OutputState) -> Floats:
+    def _feeds(self, run: LinearRun, rows: LinearRows, commanded: Floats, kept: Bools, output: OutputState) -> Floats:
         """Feed (N,) so that the tip keeps its programmed speed, as in compensate.py."""
-        feed = np.where(run.plain.kind[rows.move] == RAPID, np.nan, run.plain.feed[rows.move])
-        start = np.concatenate((carry.commanded[None], commanded[:-1]))
+        feed = np.where(run.linear.kind[rows.move] == RAPID, np.nan, run.linear.feed[rows.move])
+        start = np.concatenate((output.commanded[None], commanded[:-1]))
         same = np.concatenate(([False], rows.move[1:] == rows.move[:-1]))
         w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
-        way = run.plain.end[rows.move] - run.plain.start[rows.move]
+        way = run.linear.end[rows.move] - run.linear.start[rows.move]
         programmed = (rows.w - w0) * _sizes(way)
         step = commanded - start
         size = _sizes(step)
