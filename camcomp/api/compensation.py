@@ -14,9 +14,9 @@ from camcomp.api.result_table import ResultTable
 from camcomp.compensation.program import compensate as story
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.result import Summary
+from camcomp.compensation.program.totals import Totals
 from camcomp.compensation.report import tables
 from camcomp.compensation.report.tables import joint_bytes
-from camcomp.compensation.totals import Totals
 from camcomp.gcode.stamp import is_stamped
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import display_name, open_source, read_bytes, write_all

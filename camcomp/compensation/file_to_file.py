@@ -15,7 +15,7 @@ from camcomp.ground.files import writing
 from camcomp.model.job import Job
 
 if TYPE_CHECKING:
-    from camcomp.compensation.totals import Totals
+    from camcomp.compensation.program.totals import Totals
 
 LONG = 1 << 14  # bytes from which it pays to interpolate: some 500 lines
 MOST_EXACT = 1 << 20  # bytes up to which a program is solved point by point where its interpolation is not good enough

@@ -9,8 +9,8 @@ import pytest
 from camcomp.compensation.long import control_account
 from camcomp.compensation.long.program import LongProgram
 from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.program.totals import Totals
 from camcomp.compensation.program.verify import verify
-from camcomp.compensation.totals import Totals
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import ARC
 from camcomp.ground.files import shipped

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.program.totals import Totals
 from camcomp.compensation.report.figures import drawn_path_of, figure_error
-from camcomp.compensation.totals import Totals
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.control import program_of

@@ -21,7 +21,7 @@ from camcomp.ground.progress import watched
 from camcomp.model.config.spec import Config
 
 if TYPE_CHECKING:
-    from camcomp.compensation.totals import Totals
+    from camcomp.compensation.program.totals import Totals
     from camcomp.model.from_program import StockChoice
     from camcomp.model.job import Job
 
@@ -105,8 +105,8 @@ def work(task: Task) -> Outcome:
 
 def _compensate(task: Task) -> Outcome:
     from camcomp.compensation.program.compensate import compensate
+    from camcomp.compensation.program.totals import Totals
     from camcomp.compensation.report.tables import joint_bytes
-    from camcomp.compensation.totals import Totals
     from camcomp.gcode.stamp import is_stamped
     from camcomp.ground.errors import CheckFailed
     from camcomp.model.control import program_of

@@ -22,9 +22,10 @@ from camcomp.compensation.long.loads import RunContext
 from camcomp.compensation.long.output_state import OutputState
 from camcomp.compensation.long.proof import Sample
 from camcomp.compensation.long.runs import InterpretedRun, Runs
+from camcomp.compensation.long.totals import TotalsOfPieces
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.moves import MOST_ERRORS, RULE_OF_STATUS
-from camcomp.compensation.totals import JointRows, Totals
+from camcomp.compensation.program.totals import JointTableRows
 from camcomp.gcode.output import Part
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.stamp import is_stamped, stamp_index, stamp_text
@@ -56,9 +57,9 @@ class LongProgram:
     tolerance_um: float
     version: str
     arcs: bool | None = None
-    on_rows: Callable[[JointRows], None] | None = None
+    on_rows: Callable[[JointTableRows], None] | None = None
 
-    def run(self, source: BinaryIO, sink: Callable[[bytes], object]) -> Totals:
+    def run(self, source: BinaryIO, sink: Callable[[bytes], object]) -> TotalsOfPieces:
         """Reads the seekable source twice: once for its hash. Raises NotInPieces before or in the middle of writing."""
         digest, size, lines, rest = hashlib.sha256(), 0, 0, b""
         while block := source.read(HASHED):
@@ -72,7 +73,9 @@ class LongProgram:
         self._output = OutputState(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
         self._told: Future[None] = Future()
         self._told.set_result(None)
-        self.totals = Totals(self.job, self.name, tolerance_um=self.tolerance_um, tabled=self.on_rows is not None)
+        self.totals = TotalsOfPieces(
+            self.job, self.name, tolerance_um=self.tolerance_um, tabled=self.on_rows is not None
+        )
         self._sample = Sample(digest.hexdigest(), size)
         self._lines = max(lines, 1)
         self.totals.lines_in = lines
@@ -155,7 +158,7 @@ class LongProgram:
         except Unsolved as error:
             self._refuse(run, error)
 
-        def tell() -> JointRows:
+        def tell() -> JointTableRows:
             rows = self.totals.add_linear(run, done, self._corrector)
             self._sample.add(self._corrector, done, rows)
             return rows
@@ -179,7 +182,7 @@ class LongProgram:
         )
         return RunEngagement(piece.engaged, last, first)
 
-    def _tell(self, batch: Callable[[], JointRows]) -> None:
+    def _tell(self, batch: Callable[[], JointTableRows]) -> None:
         """Add up a piece and pass on its rows while the next piece is computed; one piece at a time, in order."""
 
         def tell() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from camcomp.compensation.long.linear_corrector import CorrectedRun, LinearCorrector
 from camcomp.compensation.program.result import Interpolation
-from camcomp.compensation.totals import JointRows
+from camcomp.compensation.program.totals import JointTableRows
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.target import correct, settle
 
@@ -21,7 +21,7 @@ class Sample:
         self._share = min(1.0, 3.0 * MOST_CHECKED * 24.0 / max(size, 1))  # a line has some 24 bytes
         self._rows: list[Floats] = []
 
-    def add(self, corrector: LinearCorrector, done: CorrectedRun, rows: JointRows) -> None:
+    def add(self, corrector: LinearCorrector, done: CorrectedRun, rows: JointTableRows) -> None:
         """Draw some of the rows of a run."""
         chosen = np.flatnonzero(self._random.random(len(rows.s)) < self._share)
         if len(chosen):

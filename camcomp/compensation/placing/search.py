@@ -18,7 +18,6 @@ from pydantic import Field
 
 from camcomp.compensation.placing.postures import STATED, start_postures
 from camcomp.compensation.program.compensate import compensate
-from camcomp.compensation.totals import Totals
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, progress
 from camcomp.ground.datatypes import RAPID, Path
@@ -152,6 +151,8 @@ class _Judge:
         try:
             program = program_of(self.data, self.name, config)
             done = compensate(program, job, method=settings.method, tolerance_um=settings.tolerance_um, version="")
+            from camcomp.compensation.program.totals import Totals
+
             totals = Totals.of(done, job)
             failed = [text for rule, text in totals.failed_checks(settings.tolerance_um) if rule == "CC602"]
             figures = totals.summary()

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from camcomp.compensation.program.compensate import Compensated, Trajectories
-from camcomp.compensation.totals import JointRows, Totals
+from camcomp.compensation.program.totals import JointTableRows, Totals
 from camcomp.gcode.linear_rows import csv_rows
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError
@@ -51,10 +51,10 @@ class JointTable:
 
     def __init__(self, file: BinaryIO, name: str, job: Job, oriented: bool = False) -> None:
         """name: of the file; oriented: of a program with orientation. Raises ConfigError CC216 without pyarrow."""
-        kind = ParquetTable if name.endswith(PARQUET) else CsvTable
-        self._table: ParquetTable | CsvTable = kind(file, joint_columns(job, oriented))
+        kind = ParquetFile if name.endswith(PARQUET) else CsvFile
+        self._table: ParquetFile | CsvFile = kind(file, joint_columns(job, oriented))
 
-    def add(self, rows: JointRows) -> None:
+    def add(self, rows: JointTableRows) -> None:
         """Adds rows."""
         actuators = np.stack((rows.nominal, rows.joints, rows.drive), axis=2).reshape(len(rows.line), -1)
         behind = [] if rows.behind is None else [rows.behind]
@@ -66,7 +66,7 @@ class JointTable:
         self._table.close()
 
 
-class CsvTable:
+class CsvFile:
     """Writes rows of a source line (n,) and values (n, k); those that do not exist are empty cells."""
 
     def __init__(self, file: BinaryIO, names: Sequence[str]) -> None:
@@ -82,7 +82,7 @@ class CsvTable:
         """Writes the end of the file."""
 
 
-class ParquetTable:
+class ParquetFile:
     """Writes batches of rows."""
 
     def __init__(self, file: BinaryIO, names: Sequence[str]) -> None:
@@ -118,7 +118,7 @@ def joint_bytes(result: Compensated, job: Job, name: str) -> bytes:
     """The joint table of a program that was corrected as a whole."""
     file = BytesIO()
     table = JointTable(file, name, job, result.orienting is not None)
-    table.add(Totals(job, result.program.name).add_exact(result))
+    table.add(Totals(job).add_exact(result))
     table.close()
     return file.getvalue()
 
@@ -134,5 +134,5 @@ def paths_csv(result: Compensated, trajectories: Trajectories) -> bytes:
     }
     head = ["line", "s_mm"] + [f"{name}_{axis}_mm" for name in named for axis in "xyz"]
     file = BytesIO()
-    CsvTable(file, head).rows(result.lines, np.column_stack((result.s, *named.values())))
+    CsvFile(file, head).rows(result.lines, np.column_stack((result.s, *named.values())))
     return file.getvalue()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from camcomp.compensation.program.compensate import compensate
-from camcomp.compensation.totals import Totals
+from camcomp.compensation.program.totals import Totals
 from camcomp.model.config.load import load_config
 from camcomp.model.control import open_program
 from camcomp.model.job import Job

@@ -12,7 +12,7 @@ from camcomp.compensation.long.linear_run import NotInPieces
 from camcomp.compensation.long.program import LongProgram
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.result import BOUND_UM
-from camcomp.compensation.totals import Totals
+from camcomp.compensation.program.totals import Totals
 from camcomp.gcode.linear_rows import csv_rows
 from camcomp.gcode.stamp import is_stamped
 from camcomp.ground.errors import CheckFailed, PhysicsError, ProgramError
