@@ -101,7 +101,7 @@ def loads_of(context: RunContext, job: Job | DrawnJob) -> Loads:
             for name in ("motion", "u", "depth", "turn", "bends")
         )
         rows, at = needed(motion, u, turn, bends, base), EngagedAt(motion, u, depth, turn)
-        return _linear(context.run, path, own, c, (motion[rows], u[rows], turn[rows], base[rows]), at)
+        return _linear(context.run, path, own, c, (motion[rows], u[rows], turn[rows], base[rows]), engaged=at)
     track = lay_track(path, c, None if engaged is None else Engaged.joined(engaged.around(own)))
     if engaged is None and len(track.motion) != n:  # a neighbour crosses the stock's top within NEAR
         raise NotInPieces
