@@ -42,7 +42,7 @@ class FollowedRuns:
             for run in runs:
                 if isinstance(run, LinearRun):
                     if stock.type == "program":
-                        bounds.add(run.path())
+                        bounds.add(run.path)
                     elif (run.linear.kind != RAPID).any():
                         bounds.tools.add(run.state.tool)
                 elif isinstance(run, InterpretedRun) and run.motions:

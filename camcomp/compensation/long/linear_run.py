@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from camcomp.gcode.linear_lines import LinearMotions
 from camcomp.gcode.state import ControlState
 from camcomp.ground.datatypes import RAPID, Floats, Ints, Path
+from camcomp.ground.errors import Location
 
 
 class NotInPieces(Exception):
@@ -41,6 +43,7 @@ class LinearRun:
         """Number of motions."""
         return len(self.linear.row)
 
+    @cached_property
     def path(self) -> Path:
         """The motions as a path."""
         linear, n, state = self.linear, self.motions, self.state
@@ -65,10 +68,11 @@ class LinearRun:
         state.feed = None if np.isnan(feed) else feed
         return state
 
-    def text_of(self, motion: int) -> bytes:
-        """The line of a motion with its end of line."""
-        a, b, c = self.linear.line[motion]
-        return self.data[a:c].tobytes() if c > b else self.data[a:b].tobytes() + b"\n"
+    def place(self, name: str, motion: int) -> Location:
+        """Where a motion stands in the program of this name: its first axis word."""
+        (a, b, _), words = self.linear.line[motion], self.linear.begin[motion, :3]
+        text = self.data[a:b].tobytes().decode("latin-1")
+        return Location(name, self.row_of(motion) + 1, int(words[words >= 0].min() - a) + 1, text)
 
     def text_from(self, motion: int) -> bytes:
         """The lines from that of a motion on."""

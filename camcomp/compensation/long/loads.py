@@ -31,7 +31,7 @@ class RunContext:
 
     def path(self) -> tuple[Path, slice]:
         """The motions with those next to them, and which of them are the run's."""
-        parts = [self.run.path(), *([self.after] if self.after else [])]
+        parts = [self.run.path, *([self.after] if self.after else [])]
         first = int(self.before is not None)
         path = Path.joined([self.before, *parts] if self.before else parts)
         return path, slice(first, first + self.run.motions)

@@ -24,7 +24,7 @@ from camcomp.compensation.long.proof import Sample
 from camcomp.compensation.long.runs import InterpretedRun, Runs
 from camcomp.compensation.long.totals import TotalsOfPieces
 from camcomp.compensation.program.compensate import compensate
-from camcomp.compensation.program.moves import MOST_ERRORS, RULE_OF_STATUS
+from camcomp.compensation.program.moves import raise_unsolved
 from camcomp.compensation.program.totals import JointTableRows
 from camcomp.gcode.output import Part
 from camcomp.gcode.setup import Setup
@@ -32,12 +32,11 @@ from camcomp.gcode.stamp import is_stamped, stamp_index, stamp_text
 from camcomp.gcode.text import Text
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID, Path
-from camcomp.ground.errors import CheckFailed, Location, PhysicsError, raise_all
+from camcomp.ground.errors import CheckFailed
 from camcomp.ground.progress import done
 from camcomp.ground.progress import part as part_of_work
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.job import Job
-from camcomp.model.statics.solve import STATUS
 
 if TYPE_CHECKING:
     from camcomp.compensation.long.followed_runs import FollowedRuns
@@ -129,8 +128,8 @@ class LongProgram:
         """Leads a piece, and only then, through the stock."""
         if self._stock is None:
             return
-        ahead = None if after is None else after.path().take(np.arange(after.ends[0] + 1))
-        piece.engaged, found = self._stock.follow(piece.path(), ahead)
+        ahead = None if after is None else after.path.take(np.arange(after.ends[0] + 1))
+        piece.engaged, found = self._stock.follow(piece.path, ahead)
         if after is not None:
             after.engaged = found
 
@@ -156,7 +155,9 @@ class LongProgram:
             context = RunContext(run, *edges, self._engagement_of(piece, before, after))
             done = self._corrector.correct(context, self._output)
         except Unsolved as error:
-            self._refuse(run, error)
+            target = self.job.frame.to_program(error.target)
+            raise_unsolved(error.move, target, error.status, lambda i: run.place(self.name, i))
+            raise  # every point of it has a status
 
         def tell() -> JointTableRows:
             rows = self.totals.add_linear(run, done, self._corrector)
@@ -170,15 +171,9 @@ class LongProgram:
         """Engagement of the tool on a piece and next to it."""
         if piece.engaged is None:
             return None
-        last = (
-            None
-            if before is None or before.engaged is None
-            else before.engaged.of_motions(before.ends[1], before.ends[1] + 1)
-        )
-        first = (
-            None
-            if after is None or after.engaged is None
-            else after.engaged.of_motions(after.ends[0], after.ends[0] + 1)
+        ends = ((before, before.ends[1] if before else 0), (after, after.ends[0] if after else 0))
+        last, first = (
+            None if each is None or each.engaged is None else each.engaged.of_motions(k, k + 1) for each, k in ends
         )
         return RunEngagement(piece.engaged, last, first)
 
@@ -192,21 +187,6 @@ class LongProgram:
 
         self._told.result()
         self._told = self._beside.submit(tell)
-
-    def _refuse(self, run: LinearRun, error: Unsolved) -> None:
-        errors: list[PhysicsError] = []
-        seen: set[int] = set()
-        for i, target, status in zip(error.move.tolist(), error.target, error.status, strict=True):
-            if i in seen or len(errors) == MOST_ERRORS:
-                continue
-            seen.add(i)
-            x, y, z = self.job.frame.to_program(target[None])[0]
-            text = f"{STATUS.get(int(status), 'no solution')} at X{x:.4f} Y{y:.4f} Z{z:.4f} (program frame, mm)"
-            source = run.text_of(i).decode("latin-1").rstrip("\r\n")
-            column = int(run.linear.begin[i, :3][run.linear.begin[i, :3] >= 0].min() - run.linear.line[i, 0]) + 1
-            at = Location(self.name, run.row0 + int(run.linear.row[i]) + 1, column, source)
-            errors.append(PhysicsError(RULE_OF_STATUS.get(int(status), "CC301"), text, at=at))
-        raise_all(errors)
 
     # --- other lines ---------------------------------------------------------------------------------------------
 
@@ -255,38 +235,25 @@ def _text_of(run: LinearRun | InterpretedRun) -> bytes:
 
 
 class _Piece:
-    """A run with what its neighbours need to know of it."""
+    """A run with what its neighbours need to know of it. Raises NotInPieces for a run without a motion of a length."""
 
     def __init__(self, run: LinearRun | InterpretedRun, runs: Runs) -> None:
         self.run = run
         self.engaged: Engaged | None = None  # what the tool meets, or, as long as it is only looked at, at its begin
-        self._path: Path | None = None
-        if isinstance(run, LinearRun):
-            linear = run.linear
-            real = np.flatnonzero((linear.kind == RAPID) | (linear.start != linear.end).any(axis=1))
-            if not len(real):
-                raise NotInPieces
-            self.ends = (int(real[0]), int(real[-1]))
-            whole = run.path()
-            self.first, self.last = (whole.take(np.array([k])) for k in self.ends)
-            return
-        path = self._path = runs.program(run.text, run.row0, run.state).path
+        linear = isinstance(run, LinearRun)
+        self.path = path = run.path if linear else runs.program(run.text, run.row0, run.state).path
         real = np.flatnonzero((path.kind == RAPID) | (path_geometry.lengths(path) > 0.0))
         if not len(real):
             raise NotInPieces
         self.ends = (int(real[0]), int(real[-1]))
-        edges = []
-        for k, u in zip(self.ends, (0.0, 1.0), strict=True):
-            way = NEAR * path_geometry.tangents(path, np.array([k]), np.array([u]))
-            point, each = path.start[k] if u == 0.0 else path.end[k], path.take(np.array([k]))
-            kind = np.where(each.kind == RAPID, RAPID, LINE).astype(np.int8)
-            straight = replace(each, kind=kind, start=point - u * way, end=point + (1.0 - u) * way)
-            edges.append(replace(straight, angle=np.zeros(1), axis=np.zeros((1, 3)), centre=np.full((1, 3), np.nan)))
-        self.first, self.last = edges
+        self.first, self.last = (_straight(path, k, u) for k, u in zip(self.ends, (0.0, 1.0), strict=True))
 
-    def path(self) -> Path:
-        """The motions."""
-        if self._path is not None:
-            return self._path
-        assert isinstance(self.run, LinearRun)
-        return self.run.path()
+
+def _straight(path: Path, k: int, u: float) -> Path:
+    """The begin (u 0) or the end (u 1) of motion k as a straight move of length NEAR."""
+    way = NEAR * path_geometry.tangents(path, np.array([k]), np.array([u]))
+    point, each = path.start[k] if u == 0.0 else path.end[k], path.take(np.array([k]))
+    return replace(
+        each, kind=np.where(each.kind == RAPID, RAPID, LINE).astype(np.int8), start=point - u * way,
+        end=point + (1.0 - u) * way, angle=np.zeros(1), axis=np.zeros((1, 3)), centre=np.full((1, 3), np.nan),
+    )  # fmt: skip

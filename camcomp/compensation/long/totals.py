@@ -48,7 +48,7 @@ class TotalsOfPieces(Totals):
     def add_linear(self, whole: LinearRun, done: CorrectedRun, corrector: LinearCorrector) -> JointTableRows:
         """Add a run of linear moves."""
         run, rows, answers = done.run, done.rows, done.answers
-        linear, path = run.linear, whole.path()
+        linear, path = run.linear, whole.path
         way = linear.end - linear.start
         length = np.sqrt(np.einsum("ni,ni->n", way, way))
         s = self._s + (np.cumsum(length) - length)[rows.move] + rows.w * length[rows.move]
