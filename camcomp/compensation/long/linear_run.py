@@ -74,13 +74,19 @@ class LinearRun:
         text = self.data[a:b].tobytes().decode("latin-1")
         return Location(name, self.row_of(motion) + 1, int(words[words >= 0].min() - a) + 1, text)
 
-    def text_from(self, motion: int) -> bytes:
-        """The lines from that of a motion on."""
-        return self.data[self.linear.line[motion, 0] : self.text_end].tobytes()
+    @property
+    def text(self) -> bytes:
+        """Its lines."""
+        return self.data[self.text_at : self.text_end].tobytes()
 
-    def text_until(self, motion: int) -> bytes:
-        """The lines up to that of a motion."""
-        return self.data[self.text_at : self.linear.line[motion, 2]].tobytes()
+    def lines_from(self, motion: int) -> tuple[bytes, ControlState, int, int]:
+        """The lines from that of a motion on, the control in front of them, the lines before them, and their motions."""
+        text = self.data[self.linear.line[motion, 0] : self.text_end].tobytes()
+        return text, self.before(motion), self.row_of(motion), self.motions - motion
+
+    def lines_until(self, motion: int) -> tuple[bytes, int]:
+        """The lines up to that of a motion, and their motions."""
+        return self.data[self.text_at : self.linear.line[motion, 2]].tobytes(), motion + 1
 
     def row_of(self, motion: int) -> int:
         """Lines of the program before that of a motion."""

@@ -106,7 +106,7 @@ class LongProgram:
         before: _Piece | None = None
         for item in self._runs:
             if isinstance(item, bytes) or not item.motions:
-                behind.append(item if isinstance(item, bytes) else _text_of(item))
+                behind.append(item if isinstance(item, bytes) else item.text)
                 if current is None:
                     yield from map(self._stamped, behind)
                     behind = []
@@ -143,9 +143,9 @@ class LongProgram:
         return data[:at] + stamp + data[at:]
 
     def _corrected(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
-        if isinstance(piece.run, InterpretedRun):
-            return self._interpreted(piece.run, piece, before, after)
-        return self._linear(piece.run, piece, before, after)
+        if isinstance(piece.run, LinearRun):
+            return self._linear(piece.run, piece, before, after)
+        return self._exactly(piece, before, after)
 
     # --- linear moves ---------------------------------------------------------------------------------------------
 
@@ -190,20 +190,14 @@ class LongProgram:
 
     # --- other lines ---------------------------------------------------------------------------------------------
 
-    def _interpreted(self, run: InterpretedRun, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
-        """Through the exact way, with the motions on either side in sight."""
-        head, state, row0 = b"", run.state, run.row0
-        first = behind = 0
+    def _exactly(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
+        """Point by point, with the motions on either side in sight."""
+        run, (head, first), (tail, behind) = piece.run, (b"", 0), (b"", 0)
+        _, state, row0, _ = run.lines_from(0)
         if before is not None:
-            assert isinstance(before.run, LinearRun)
-            k = before.ends[1]
-            head, state, row0 = before.run.text_from(k), before.run.before(k), before.run.row_of(k)
-            first = before.run.motions - k
-        tail = b""
+            head, state, row0, first = before.run.lines_from(before.ends[1])
         if after is not None:
-            assert isinstance(after.run, LinearRun)
-            tail = after.run.text_until(after.ends[0])
-            behind = after.ends[0] + 1
+            tail, behind = after.run.lines_until(after.ends[0])
         program = self._runs.program(head + run.text + tail, row0, state)
         part = Part(first, len(program.path) - behind, self._output.standing())
         if part.last - part.first != run.motions:
@@ -230,18 +224,14 @@ def _stock_of(job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRu
     return FollowedRuns.of(job, source, name, setup)
 
 
-def _text_of(run: LinearRun | InterpretedRun) -> bytes:
-    return run.text if isinstance(run, InterpretedRun) else run.data[run.text_at : run.text_end].tobytes()
-
-
 class _Piece:
     """A run with what its neighbours need to know of it. Raises NotInPieces for a run without a motion of a length."""
 
     def __init__(self, run: LinearRun | InterpretedRun, runs: Runs) -> None:
         self.run = run
         self.engaged: Engaged | None = None  # what the tool meets, or, as long as it is only looked at, at its begin
-        linear = isinstance(run, LinearRun)
-        self.path = path = run.path if linear else runs.program(run.text, run.row0, run.state).path
+        path = run.path if isinstance(run, LinearRun) else runs.program(run.text, run.row0, run.state).path
+        self.path = path
         real = np.flatnonzero((path.kind == RAPID) | (path_geometry.lengths(path) > 0.0))
         if not len(real):
             raise NotInPieces

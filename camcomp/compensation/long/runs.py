@@ -56,6 +56,14 @@ class InterpretedRun:
     state: ControlState  # in front of it
     motions: int
 
+    def lines_from(self, _motion: int) -> tuple[bytes, ControlState, int, int]:
+        """The lines, the control in front of them, the lines before them, and their motions; all of them for any motion."""
+        return self.text, self.state, self.row0, self.motions
+
+    def lines_until(self, _motion: int) -> tuple[bytes, int]:
+        """The lines, and their motions."""
+        return self.text, self.motions
+
 
 @dataclass(eq=False, kw_only=True)
 class Runs:
