@@ -24,8 +24,7 @@ from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, tota
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats
 
-BETTER = 0.8  # of what a law leaves: what another one or a map has to leave to be told instead
-LEAST_SHRINKAGE = 0.1  # of the gap on withheld parts, below which nothing was found
+BETTER = 0.9  # of what the causes or a law leave on withheld parts: a law, or another one, has to leave less
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -76,21 +75,25 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
     floor, before = problem.floor.tip_um, rms_um(_gaps(problem, f))
     room = float(np.sqrt(max(before**2 - floor**2, 0.0)))
 
-    def much(best: _Tried | None) -> bool:
-        left = float(np.sqrt(max((before if best is None else best.after) ** 2 - floor**2, 0.0)))
-        return left > GATE * floor and left > GATE * room
+    def formula(own: Fitted | None) -> FoundLaw | None:
+        return find_law(bench, _base(problem, own, bench, kind), grids, 1e-3 * floor)
 
-    best = _tried(problem, f, bench, find_law(bench, _base(problem, f, bench, kind), grids))
-    if much(best) and room > floor:  # what is small may be the usual small errors
-        other = _tried(problem, None, bench, find_law(bench, _base(problem, None, bench, kind), grids))
-        if other is not None and other.after < BETTER * (before if best is None else best.after):
-            best = other
-    if much(best) and kind == "tip":
-        split = usual_split(len(problem.bench.runs))
-        smooth = _tried(problem, f, bench, find_map(bench, _base(problem, f, bench, kind)(split, False), kind))
-        if smooth is not None and smooth.after < BETTER * (before if best is None else best.after):
-            best = smooth
-    if best is None or best.after > (1.0 - LEAST_SHRINKAGE) * before:
+    def smooth(own: Fitted | None) -> FoundLaw | None:
+        return find_map(bench, _base(problem, own, bench, kind)(usual_split(len(problem.bench.runs)), False), kind)
+
+    best, after = None, before
+    # what is small without the causes may be the usual small errors
+    for k, (own, find, asked) in enumerate(
+        ((f, formula, True), (None, formula, room > floor), (f, smooth, kind == "tip"))
+    ):
+        much = np.sqrt(max(after**2 - floor**2, 0.0)) > GATE * max(floor, room)
+        if k and not (asked and much):
+            continue
+        found = find(own)
+        tried = None if found is None else _beside(problem, own, bench, found)
+        if tried is not None and tried.after < BETTER * after:
+            best, after = tried, tried.after
+    if best is None:
         return None
     joint = with_law(problem, bench, best.found)
     fit = fit_needed(joint, f.members)
@@ -134,10 +137,6 @@ def _gaps(problem: Problem, f: Fitted | None) -> list[Floats]:
 
 def _gap(problem: Problem, f: Fitted, k: int, theta: Floats) -> Floats:
     return problem.bench.gap(k, problem.causes(f.members, theta, f.extra))[:, :3]
-
-
-def _tried(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw | None) -> _Tried | None:
-    return None if found is None else _beside(problem, f, bench, found)
 
 
 def _beside(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw) -> _Tried:

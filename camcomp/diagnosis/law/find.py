@@ -14,21 +14,17 @@ from itertools import combinations
 
 import numpy as np
 
+from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench
 from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, White, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.screen import Screen, TermGrid
 from camcomp.diagnosis.law.shapes import Shapes
+from camcomp.diagnosis.model.classes import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
 MOST_TERMS = 6
 REFINED = 7  # kinds of terms whose shapes are followed at every step
-PER_SHAPE = 3.0  # log density that a number of a shape has to bring: it was looked for among many
-PER_TERM = 4.0
-POOL = 14  # terms among which all sets of up to three are tried
-SAME = 3.0  # log density by which a term may be worse and is still as good
-LEAST_GAIN = 0.01  # of the log density that a law has brought: less is not worth a term
-LEAST_SHARE = 0.03  # of a law's energy at the tip, below which a term goes again
 CONSTANT = Form(family="constant", about=(), texts=("1",), units=("",))
 _PLAIN = ("line", "power", "product", "rate", "force")  # simpler kinds of the same value come first
 
@@ -81,28 +77,25 @@ def fitted(shapes: Shapes, terms: Sequence[Term], folds: Folds) -> FoundLaw:
 
 
 def find_law(
-    bench: TermBench, base: Callable[[Split, bool], Folds], grids: Sequence[TermGrid], *, seed: int = 0
+    bench: TermBench, base: Callable[[Split, bool], Folds], grids: Sequence[TermGrid], floor_mm: float
 ) -> FoundLaw | None:
     """The law with terms of the grids that the residual follows; None where all fail on withheld parts.
 
     base: makes the folds of a split of time, with or without a free constant at every spot of the tip.
     """
-    return _Search(bench, base, usual_split(len(bench.bench.runs)), grids, np.random.default_rng(seed)).run()
+    return _Search(bench, base, grids, floor_mm).run()
 
 
 class _Search:
     def __init__(
-        self,
-        bench: TermBench,
-        base: Callable[[Split, bool], Folds],
-        split: Split,
-        grids: Sequence[TermGrid],
-        rng: np.random.Generator,
+        self, bench: TermBench, base: Callable[[Split, bool], Folds], grids: Sequence[TermGrid], floor_mm: float
     ) -> None:
-        self.base, self.split, self.folds = base, split, base(split, True)
-        self.bench, self.grids = bench, grids
-        self.screen = Screen(grids, self.folds, rng)
+        self.base, self.split = base, usual_split(len(bench.bench.runs))
+        self.folds = base(self.split, True)
+        self.bench, self.grids, self.floor_mm = bench, grids, floor_mm
+        self.screen = Screen(grids, self.folds, np.random.default_rng(0))
         self.shapes = Shapes(bench)
+        self.per_term = float(np.log(len({Term(s, f).kind for grid in grids for s in grid.spots for f in grid.forms})))
 
     def run(self) -> FoundLaw | None:
         chosen: list[Term] = []
@@ -121,7 +114,7 @@ class _Search:
             pool += [term for _, term in fine[: 2 * REFINED]]
             best = self._simplest(fine)
             after = self._score((*chosen, best))
-            if after < score + max(PER_TERM, LEAST_GAIN * score):
+            if after < score + EQUAL_LOG_ODDS:
                 break
             chosen, score = [*chosen, best], after
         if not chosen:
@@ -133,10 +126,10 @@ class _Search:
         return self._answer(self._with_constants(chosen), pool)
 
     def _with_constants(self, chosen: list[Term]) -> list[Term]:
-        """The terms, and a constant per spot where it raises the score by more than PER_TERM."""
+        """The terms, and a constant per spot where it makes withheld parts clearly more probable."""
         for spot in dict.fromkeys(term.spot for term in chosen):
             more = [*chosen, Term(spot, CONSTANT)]
-            if self._score(more) > self._score(chosen) + PER_TERM:
+            if self._score(more) > self._score(chosen) + EQUAL_LOG_ODDS:
                 chosen = more
         return chosen
 
@@ -171,14 +164,14 @@ class _Search:
         white, size = self.shapes.columns(term)
         return withheld(gains(*step.together([white]), size)) - self._costs([term]), term
 
-    @staticmethod
-    def _costs(terms: Sequence[Term]) -> float:
-        return sum(PER_SHAPE * len(t.form.shape) + PER_TERM for t in terms)
+    def _costs(self, terms: Sequence[Term]) -> float:
+        """Log odds against terms: their kinds are equally likely, and shapes were looked for among many."""
+        return sum(EQUAL_LOG_ODDS * len(t.form.shape) + self.per_term for t in terms)
 
     @staticmethod
     def _simplest(fine: Sequence[tuple[float, Term]]) -> Term:
         """Of the terms that are as good as the best, one of a plain kind."""
-        near = [term for score, term in fine if score > fine[0][0] - SAME]
+        near = [term for score, term in fine if score > fine[0][0] - EQUAL_LOG_ODDS]
         return min(near, key=lambda t: (t.form.family not in _PLAIN, len(t.form.shape), unlikely(t)))
 
     # -- sets ----------------------------------------------------------------------------------------------------------
@@ -201,7 +194,9 @@ class _Search:
 
     def _exhaustive(self, chosen: list[Term], pool: Sequence[Term], score: float) -> list[Term]:
         """The best of all sets of up to three terms of the pool, where it exceeds the chosen set by the margin."""
-        terms = list(dict.fromkeys([*chosen, *sorted(pool, key=lambda t: -self._score([t]))]))[: max(POOL, len(chosen))]
+        terms = list(dict.fromkeys([*chosen, *sorted(pool, key=lambda t: -self._score([t]))]))[
+            : max(2 * REFINED, len(chosen))
+        ]
         of = self._scores(terms)
         best, value = chosen, score
         for count in (1, 2, 3):
@@ -212,10 +207,10 @@ class _Search:
         return best
 
     def _without_idle(self, chosen: list[Term]) -> list[Term]:
-        """The terms whose share of the law's energy exceeds LEAST_SHARE."""
+        """The terms that move the tip by MINOR of the noise floor, or the largest one."""
         while len(chosen) > 1:
             size = list(strengths(self.bench, fitted(self.shapes, chosen, self.folds)))
-            if min(size) > LEAST_SHARE * sum(size):
+            if min(size) > (MINOR * self.floor_mm) ** 2:
                 break
             chosen.pop(int(np.argmin(size)))
         return chosen
@@ -227,7 +222,7 @@ class _Search:
         alike = []
         for i, term in enumerate(chosen):
             instead = [(j, other) for j, other in enumerate(others, own) if other.kind != term.kind]
-            same = [other for j, other in instead if of([*range(i), j, *range(i + 1, own)]) > gain - SAME]
+            same = [other for j, other in instead if of([*range(i), j, *range(i + 1, own)]) > gain - EQUAL_LOG_ODDS]
             alike.append(tuple(same))
         return replace(fitted(self.shapes, chosen, self.folds), alike=tuple(alike))
 
@@ -243,8 +238,8 @@ def margin(tried: Sequence[Term], best: Sequence[Term]) -> float:
     """Log density by which a set has to be more probable than another: fewer terms and fewer shapes go before."""
     shapes = [sum(len(t.form.shape) for t in terms) for terms in (tried, best)]
     if len(tried) < len(best):
-        return -SAME
-    return SAME if shapes[0] > shapes[1] else 0.5
+        return -EQUAL_LOG_ODDS
+    return EQUAL_LOG_ODDS if shapes[0] > shapes[1] else 0.5
 
 
 def unlikely(term: Term) -> bool:

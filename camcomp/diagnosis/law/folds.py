@@ -16,9 +16,7 @@ from scipy.linalg import solve_triangular
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats, Ints
 
-FEW_RUNS = 4  # from which on runs are withheld, else stretches of them
-PARTS = 6
-SHORT = 48  # stretches of a run, every other one of which is withheld where something acts for a while only
+PARTS = 4  # that are withheld: runs, or stretches of fewer runs
 WIDE_MM = 0.2  # what a law may move the tip by, standard deviation before any data
 
 
@@ -65,12 +63,12 @@ class Split:
         return np.asarray(number)
 
 
-ALTERNATING = Split(SHORT, 2)
+ALTERNATING = Split(48, 2)  # every other stretch of a run is withheld where something acts for a while only
 
 
 def usual_split(runs: int) -> Split:
     """Whole runs, one after the other, or stretches of time where there are few."""
-    each = 1 if runs >= FEW_RUNS else -(-PARTS // runs)
+    each = -(-PARTS // runs)
     return Split(each, each)
 
 

@@ -13,7 +13,6 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model.law.covariates import is_load, load_of
 
 MOST_WAVES = 240  # periods of one covariate that are tried
-LEAST_SPAN_MM = 2.0
 _HARD_MM = 0.02  # a reversal that is over at once
 _CENTRES, _MOMENTS = 13, 40
 _LASTS = (0.5, 1.0, 2.0, 4.0, 8.0)  # s that something acts for
@@ -160,7 +159,7 @@ def _times(size: Sizes) -> Iterator[Form]:
 def at_tip(size: Sizes) -> list[Form]:
     """Forms of effects that move the tip."""
     out: list[Form] = []
-    axes = [f"{a}_mm" for a in "xyz" if size.span(f"{a}_mm") > LEAST_SPAN_MM]
+    axes = [f"{a}_mm" for a in "xyz" if size.wide(f"{a}_mm")]
     for name in axes:
         low, span, speed = size.limits[name][0], size.span(name), f"v{name}_per_s"
         out += [*_powers(name, "mm", 4), *_waves(name, span, max(3.0 * size.apart[name], span / 25.0))]
@@ -191,7 +190,7 @@ def at_drive(size: Sizes, revolute: bool) -> list[Form]:
     unit = "rad" if revolute else "mm"
     name, speed = f"act_{unit}", f"act_{unit}_per_s"
     low, span = size.limits[name][0], size.span(name)
-    if span < (1e-3 if revolute else LEAST_SPAN_MM):
+    if not size.wide(name):
         return list(_times(size))
     out = [*_powers(name, unit, 3), *_waves(name, span, max(3.0 * size.apart[name], span / 40.0))]
     out += [*_bumps(name, low, span), *_senses(name, span)]

@@ -15,7 +15,6 @@ from camcomp.ground.datatypes import Floats
 INSTANTS, TURNS = 60, 2  # moments between rows that are tried for a beginning and for an end, and how often in turn
 PHASES = 6  # of a turn between the first row and the last, by which swings that are tried differ
 MOST_APART = 500  # such steps to both sides: runs that are days apart do not count turns
-TINY = 1e-12
 
 
 class Shapes:
@@ -36,7 +35,7 @@ class Shapes:
         if isinstance(term.form, SmoothForm):
             size = term.form.width**-2.0
         else:
-            size = float(np.mean(self.bench.rms(term.spot, values) ** 2)) / WIDE_MM**2 + TINY
+            size = float(np.mean(self.bench.rms(term.spot, values) ** 2)) / WIDE_MM**2 + 1e-12
         return self.bench.white(term.spot, values), np.full(term.form.size, size)
 
     def followed(self, step: Folds, term: Term) -> Term:
@@ -103,7 +102,7 @@ class Shapes:
         values, count = self.bench.values(spot, *forms), forms[0].size
         white = self.bench.white(spot, values)
         G, h, _ = step.alone(white, step.products(white, count))
-        size = np.mean(self.bench.rms(spot, values).reshape(-1, count) ** 2, axis=1) / WIDE_MM**2 + TINY
+        size = np.mean(self.bench.rms(spot, values).reshape(-1, count) ** 2, axis=1) / WIDE_MM**2 + 1e-12
         return gains(G, h, np.repeat(size[:, None], count, axis=1))
 
 

@@ -9,8 +9,6 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats
 
-_NARROW = 1e-6
-
 
 @dataclass(frozen=True)
 class Sizes:
@@ -30,7 +28,7 @@ class Sizes:
     def wide(self, name: str) -> bool:
         """Whether it varies at all."""
         low, high = self.limits[name]
-        return high - low > max(_NARROW, 1e-3 * max(abs(low), abs(high)))
+        return high - low > max(1e-6, 1e-3 * max(abs(low), abs(high)))
 
 
 def sizes(rows: Sequence[Mapping[str, Floats]]) -> Sizes:

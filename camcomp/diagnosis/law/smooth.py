@@ -16,21 +16,20 @@ from camcomp.diagnosis.law.folds import Folds, gains, withheld
 from camcomp.diagnosis.law.forms import SmoothForm
 from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.law.sizes import Sizes
+from camcomp.diagnosis.model.classes import EQUAL_LOG_ODDS
 
 ALONG, BOTH = 12, 6  # splines over one covariate, and over each of two
 WIDTHS_MM = (0.01, 0.03, 0.1)  # of the coefficients at the tip, standard deviation before any data
-LEAST_GAIN = 10.0  # log density on withheld parts
-MOST_MAPS = 3
 _SINGLE = ("heading_rad", "temp_C", "cut_min", "fx_N", "fy_N", "fz_N")
 
 
 def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundLaw | None:
     """The maps that the residual of a kind of channel follows; None where the gain on withheld parts stays below
-    LEAST_GAIN.
+    EQUAL_LOG_ODDS.
     """
     where, shapes, step = spots(len(bench.bench.actuators), kind), Shapes(bench), folds
     chosen: list[Term] = []
-    while len(chosen) < MOST_MAPS:
+    while len(chosen) < len(where):
         best: tuple[float, Term] | None = None
         for spot in [s for s in where if all(s != each.spot for each in chosen)]:
             size = bench.sizes(spot)
@@ -42,7 +41,7 @@ def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundLaw | None:
                     gain = withheld(gains(G, h, np.full(form.size, width**-2.0)))
                     if best is None or gain > best[0]:
                         best = gain, Term(spot, replace(form, width=width))
-        if best is None or best[0] < LEAST_GAIN:
+        if best is None or best[0] < EQUAL_LOG_ODDS:
             break
         chosen.append(best[1])
         found = fitted(shapes, chosen, folds)

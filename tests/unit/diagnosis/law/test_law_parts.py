@@ -48,7 +48,7 @@ def test_what_is_withheld_is_judged_by_what_the_others_say():
 
 
 def test_few_runs_are_withheld_in_stretches_and_what_lasts_a_while_in_every_other_one():
-    assert usual_split(5) == Split(1, 1) and usual_split(2) == Split(3, 3)
+    assert usual_split(5) == Split(1, 1) and usual_split(2) == Split(2, 2)
     assert Split(3, 3).of(np.array([0.0, 0.4, 0.7, 1.0])).tolist() == [0, 1, 2, 2]
     place = (np.arange(ALTERNATING.stretches) + 0.5) / ALTERNATING.stretches
     assert ALTERNATING.of(place).tolist() == [0, 1] * (ALTERNATING.stretches // 2)
