@@ -168,9 +168,10 @@ def _figure(figure: Figure) -> str:
             f'<input type="range" id="{name}-k" min="0" max="100" step="1">'
             f'<output id="{name}-o" for="{name}-k"></output>{plane}</div>'
         )
+    label = escape(figure.label or f"{figure.title}: {figure.caption}", quote=True)
     return (
         f'<figure id="{name}"><h3>{escape(figure.title)}</h3>{controls}'
-        f'<div class="plot" id="{name}-plot" role="img" aria-label="{escape(figure.label, quote=True)}" '
+        f'<div class="plot" id="{name}-plot" role="img" aria-label="{label}" '
         f'style="height:{figure.height}px"></div><figcaption>{escape(figure.caption)}</figcaption></figure>'
     )
 

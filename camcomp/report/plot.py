@@ -28,7 +28,7 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """One plot of a page. label: for screen readers; caption: below the plot.
+    """One plot of a page. label: for screen readers, by default title and caption; caption: below the plot.
 
     exaggerate: base curve and shifts of a plot whose deviations a slider enlarges: one base for all curves in one of
     `planes`, or in space a base for each curve and no planes (see assets/page.js).
@@ -37,7 +37,7 @@ class Figure:
     name: str
     title: str
     caption: str
-    label: str
+    label: str = ""
     traces: Sequence[Json] = ()
     layout: Mapping[str, Any] = field(default_factory=dict)
     height: int = 340

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import wrap
 
 import numpy as np
@@ -41,10 +41,7 @@ class MotionDesign:
         """The design in round numbers: 0.1 mm, three digits of feed."""
         x, y, z = (round(v, 1) + 0.0 for v in self.centre)  # no -0
         feed = float(f"{self.feed:.3g}")
-        return MotionDesign(
-            centre=(x, y, z), radius=max(round(self.radius, 1), 0.1), feed=feed, plane=self.plane, turns=self.turns,
-            along=self.along, cutting=self.cutting, wait_s=self.wait_s, dwell_s=self.dwell_s,
-        )  # fmt: skip
+        return replace(self, centre=(x, y, z), radius=max(round(self.radius, 1), 0.1), feed=feed)
 
     @property
     def length(self) -> float:

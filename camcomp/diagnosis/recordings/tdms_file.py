@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -22,8 +20,10 @@ def read_tdms(data: bytes, name: str) -> list[SampledColumns]:
     nptdms = library("nptdms", "npTDMS", "TDMS files")
     together: dict[_Key, list[tuple[str, str, Floats]]] = {}
     dropped = 0
-    with reading(name, "a TDMS file"), _remarks_of(nptdms) as remarks:
-        for group in nptdms.TdmsFile.read(io.BytesIO(data)).groups():
+    nptdms.log.log_manager.set_level(logging.CRITICAL)  # the file's status says the same
+    with reading(name, "a TDMS file"):
+        file = nptdms.TdmsFile.read(io.BytesIO(data))
+        for group in file.groups():
             for channel in group.channels():
                 values = np.asarray(channel[:])
                 if values.ndim != 1 or values.dtype.kind not in "iufb" or not len(values):
@@ -34,7 +34,7 @@ def read_tdms(data: bytes, name: str) -> list[SampledColumns]:
                 together.setdefault(key, []).append((f"{group.name}.{channel.name}", unit, values.astype(float)))
     if not together:
         raise ConfigError("CC452", "the file has no channels with numbers", at=Location(name, 1, 1))
-    notes = [f"npTDMS: {each}" for each in remarks[:1]]
+    notes = ["the last segment is not complete"] if file.file_status.channel_statuses is not None else []
     if dropped:
         notes.append(f"{dropped} channels without numbers dropped")
     out = []
@@ -44,28 +44,6 @@ def read_tdms(data: bytes, name: str) -> list[SampledColumns]:
         out.append(of_values(name, labels, units, columns, time=time, notes=notes))
         notes = []
     return out
-
-
-@contextmanager
-def _remarks_of(nptdms: Any) -> Iterator[list[str]]:
-    """Context that collects the library's log messages about the file."""
-    remarks: list[str] = []
-    handler = logging.Handler()
-    handler.emit = lambda record: remarks.append(record.getMessage()[:120])  # type: ignore[method-assign]
-    manager = nptdms.log.log_manager
-    manager.console_handler.setLevel(logging.CRITICAL)
-    silenced = logging.root.manager.disable
-    logging.disable(logging.NOTSET)  # other libraries may have disabled logging
-    for logger in manager.loggers.values():
-        logger.disabled = False
-        logger.addHandler(handler)
-    try:
-        yield remarks
-    finally:
-        for logger in manager.loggers.values():
-            logger.removeHandler(handler)
-        logging.disable(silenced)
-        manager.console_handler.setLevel(manager.log_level)
 
 
 def _sampling(properties: Any) -> tuple[float | None, float]:

@@ -114,7 +114,6 @@ def _figure(gaps: Sequence[RadialGap], number: int) -> Figure:
         title=f"Circle {name}",
         caption=f"Measured minus modelled in the direction of the radius, outwards where the tip ran too far out: {words}. Runs "
         f"{runs}. The slider says how much it is enlarged; the dotted ring lies {ring:g} µm outside the circle.",
-        label=f"Polar plot of the radial gap on the circle {name}, both directions: {words}.",
         traces=traces,
         layout={"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)},
         height=560,

@@ -44,7 +44,6 @@ def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
         title="Shrinkage ladder",
         caption=f"Root mean square of the gap on runs that the fit has not seen, with one cause after the other put into the "
         f"model: {words}. Noise floor {known}.",
-        label=f"Bar chart of the gap that remains: {words}; noise floor {known}.",
         traces=[bars] if floor is None else [bars, noise],
         layout={
             "xaxis": axis("gap in µm (rms)", range=[0.0, 1.15 * max(*values, floor or 0.0)]),
@@ -79,7 +78,6 @@ def figure_signed(view: RunView, number: int) -> Figure:
         name=f"time-{number}",
         title=f"Run {view.name}: gap along the time, with its sign",
         caption=f"Measured minus modelled in each direction; mean before: {words}. {_told(view)}",
-        label=f"Plot of the signed gap of run {view.name} along the time; mean before: {words}.",
         traces=curves,
         layout={"xaxis": axis("time in s"), "yaxis": axis("gap in µm", zerolinecolor=INK)},
     )
@@ -99,7 +97,6 @@ def figure_size(view: RunView, number: int, floor: float | None) -> Figure:
         name=f"path-{number}",
         title=f"Run {view.name}: size of the gap along the path",
         caption=f"Size of measured minus modelled: {words}. {_told(view)}",
-        label=f"Plot of the size of the gap of run {view.name} along the path: {words}.",
         traces=curves,
         layout={"xaxis": axis("path length in mm"), "yaxis": axis("gap in µm", rangemode="tozero")},
         height=300,
@@ -146,7 +143,6 @@ def figure_map(views: Sequence[RunView]) -> Figure:
         name="map",
         title="Map on the workpiece",
         caption=f"Every measured row where the tip was, coloured by the size of the gap, {words}.",
-        label=f"Map of the gap over {a} and {b} of the workpiece, {words}.",
         traces=traces,
         layout=layout,
         height=430,
@@ -168,8 +164,7 @@ def figure_shares(where: Where) -> Figure | None:
         name="shares",
         title="By axis and actuator, and what it depends on",
         caption="Share of the gap's energy above the noise by axis of the workpiece and, read as motion of the carriages, by "
-        "actuator; below, how much of the gap follows each quantity. These may overlap.",
-        label=f"Bar chart of shares of the gap: {words}.",
+        f"actuator; below, how much of the gap follows each quantity: {words}. These may overlap.",
         traces=[bars],
         layout={"xaxis": axis("share in %", range=[0, 115]), "yaxis": axis(""), "margin": BAR_MARGIN},
         height=120 + 26 * len(rows),
@@ -192,7 +187,6 @@ def figure_spectrum(view: RunView) -> Figure | None:
         name="spectrum",
         title=f"By frequency, run {view.name}",
         caption=f"Amplitude of the gap, all channels together: {words}.",
-        label=f"Plot of the amplitude of the gap over frequency: {words}.",
         traces=curves,
         layout={"xaxis": axis("frequency in Hz", type="log", dtick=1, exponentformat="power"),
          "yaxis": axis("amplitude in µm", type="log", dtick=1, exponentformat="power")},
@@ -213,8 +207,8 @@ def figure_causes(causes: Sequence[FoundCause]) -> Figure:
     return Figure(
         name="causes-plot",
         title="Causes by probability",
-        caption="Probability that the cause is at work, given the library of effects, and its share of the gap's energy.",
-        label=f"Bar chart of causes and their probabilities: {words}.",
+        caption="Probability that the cause is at work, given the library of effects, and its share of the gap's energy; "
+        f"probabilities: {words}.",
         traces=bars,
         layout={
             "xaxis": axis("%", range=[0, 115]),
@@ -243,7 +237,6 @@ def figure_rivals(rivals: Sequence[RivalSignals], views: Sequence[RunView]) -> F
         title="Why they cannot be told apart",
         caption=f"What each set of causes does to {view.channels[c]} in run {view.name}. Likeness with {rivals[0].name} over all "
         f"runs: {alike}.",
-        label=f"Plot of the signals of causes that cannot be told apart; likeness with {rivals[0].name}: {alike}.",
         traces=curves,
         layout={"xaxis": axis("time in s"), "yaxis": axis("signal in µm", zerolinecolor=INK)},
     )

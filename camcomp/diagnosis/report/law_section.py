@@ -63,7 +63,6 @@ def _figure(law: Law, view: LawView) -> Figure:
         title=f"What is left of tip {view.axis} over {view.covariate}",
         caption=f"Every row of all runs: what the known causes leave, and {shortened(law.formula)}. On runs that it was not fitted to it takes the "
         f"gap {words}.",
-        label=f"Scatter plot of what is left of tip {view.axis} over {view.covariate}, with the law on top; {words}.",
         traces=traces,
         layout={"xaxis": axis(view.covariate), "yaxis": axis("µm")},
     )

@@ -69,35 +69,28 @@ def diagnosis_html(
     seen = [view for view in views if view.held_out] or list(views)
     seen = sorted(seen, key=lambda view: -rms(view.sizes[0]))
     floor = result.gap.noise_floor_um
-    sections = [Section(name="notes", title="Notes", items=notes)] if notes else []
-    sections.append(_to_do(result, next_program))
-    if (circles := circles_section(views, result.standards.circles)) is not None:
-        sections.append(circles)
-    sections.append(_causes(result))
-    if result.law is not None:
-        sections.append(law_section(result.law, law))
-    if len(result.alternatives) > 1:
-        sections.append(_apart(result, rivals, views))
-    if result.shrinkage and result.shrinkage.steps:
-        text, ladder = [_shrinkage(result.shrinkage)], figure_ladder(result.shrinkage, floor)
-        sections.append(Section(name="shrinkage", title="How far the gap shrinks", text=text, figures=[ladder]))
-    if (joints := joints_section(result, residuals)) is not None:
-        sections.append(joints)
-    sections += _gap_of_runs(seen, floor)
-    sections.append(_where(result.where, seen[:MOST_DRAWN]))
-    if (standards := standards_section(result.standards)) is not None:
-        sections.append(standards)
-    if inputs:
-        sections.append(inputs_section(inputs))
-    verdict = result.verdict
+    sections = [
+        Section(name="notes", title="Notes", items=notes) if notes else None,
+        _to_do(result, next_program),
+        circles_section(views, result.standards.circles),
+        _causes(result),
+        None if result.law is None else law_section(result.law, law),
+        _apart(result, rivals, views) if len(result.alternatives) > 1 else None,
+        _shrinkage(result.shrinkage, floor) if result.shrinkage and result.shrinkage.steps else None,
+        joints_section(result, residuals),
+        *_gap_of_runs(seen, floor),
+        _where(result.where, seen[:MOST_DRAWN]),
+        standards_section(result.standards),
+        inputs_section(inputs) if inputs else None,
+    ]
     page = Page(
         title=title,
         subtitle=f"Diagnosis of the gap between {machine} and its model",
         verdict=verdict_text(result),
-        good=verdict in ("none", "identified"),
+        good=result.verdict in ("none", "identified"),
         cards=_cards(result),
-        sections=sections,
-        word=WORDS[verdict],
+        sections=[each for each in sections if each is not None],
+        word=WORDS[result.verdict],
     )
     return render(page)
 
@@ -170,12 +163,14 @@ def _apart(result: DiagnosisResult, rivals: Sequence[RivalSignals], views: Seque
     )
 
 
-def _shrinkage(shrink: UnseenShrinkage) -> str:
+def _shrinkage(shrink: UnseenShrinkage, floor: float | None) -> Section:
     low, high = shrink.ci95
-    return (
+    text = (
         f"Judged on {listed(shrink.holdout)}, with causes fitted without what is judged. {100 * shrink.ratio:.1f} % of the "
         f"gap goes (95 % interval {100 * low:.1f} to {100 * high:.1f} %)."
     )
+    ladder = figure_ladder(shrink, floor)
+    return Section(name="shrinkage", title="How far the gap shrinks", text=[text], figures=[ladder])
 
 
 def _to_do(result: DiagnosisResult, next_program: Listing | None) -> Section:

@@ -167,7 +167,7 @@ def test_tdms_waveforms_and_units(tmp_path, capsys):
     log = got.logs["run"]
     assert log["t_s"] == pytest.approx(0.002 * np.arange(30))
     assert log["cmd_y_mm"] == pytest.approx(2 * np.arange(30)) and log["act_z_mm"] == pytest.approx(3 * np.arange(30))
-    assert "1 channels without numbers dropped" in got.told and "npTDMS" not in got.told
+    assert "1 channels without numbers dropped" in got.told and "segment" not in got.told
     with nptdms.TdmsWriter(tmp_path / "cut.tdms") as writer:
         writer.write_segment(channels[:-1])
     (tmp_path / "cut.tdms").write_bytes((tmp_path / "cut.tdms").read_bytes()[:-200])
@@ -176,7 +176,9 @@ def test_tdms_waveforms_and_units(tmp_path, capsys):
         got = imported(capsys, tmp_path / "y", tmp_path / "cut.tdms", config="cartesian")
     finally:
         logging.disable(logging.NOTSET)
-    assert "npTDMS: " in got.told and "WARNING" not in got.told and len(got.told.splitlines()) == 2
+    assert (
+        "the last segment is not complete" in got.told and "WARNING" not in got.told and len(got.told.splitlines()) == 2
+    )
     wild = [nptdms.ChannelObject("d", f"{k}_{a}", np.array([0.0, 1e300]), wave) for a in "xyz" for k in ("cmd", "act")]
     with nptdms.TdmsWriter(tmp_path / "wild.tdms") as writer:
         writer.write_segment(wild)
