@@ -20,6 +20,7 @@ from camcomp.model.law.expression import parse
 from camcomp.model.law.spline_map import splines, tensor
 from camcomp.model.statics.description import Robot
 
+WIDE_MM = 0.2  # what a law may move the tip by, standard deviation before any data
 AT_ONCE_BYTES = 12e6  # of functions that are worked out together, before rows are thinned
 Rows = TipRows | DriveRows
 
@@ -99,6 +100,11 @@ class TermBench:
         ways = self._squares[spot]
         energy = np.sum([way @ v**2 for way, v in zip(ways, values, strict=True)], axis=0)
         return np.asarray(np.sqrt(energy / sum(len(v) for v in values)))
+
+    def precision(self, spot: Spot, values: Sequence[Floats], count: int) -> Floats:
+        """Prior precision (f, count) of functions (n, f count) of which each `count` belong together: WIDE_MM at the tip."""
+        size = np.mean(self.rms(spot, values).reshape(-1, count) ** 2, axis=1) / WIDE_MM**2
+        return np.repeat(size[:, None] + 1e-12, count, axis=1)
 
     def _tip_ways(self, spot: Spot) -> list[Floats]:
         bench = self.bench

@@ -33,7 +33,7 @@ def law_result(bench: TermBench, found: FoundLaw, before_um: float, after_um: fl
         says = law_sentence([each for each in forms if isinstance(each, Form)])
     if alike:
         says += f" These data cannot tell it from {listed(list(alike)[:3])}."
-    formula = "; ".join(f"{_where_of(each)} = {_equation(each)}" for each in parts)
+    formula = "; ".join(f"{where_of(each)} = {_equation(each)}" for each in parts)
     envelope = {name: limits for each in parts for name, limits in each.envelope.items()}
     return Law(
         formula=formula, on=_stage(bench, found), terms=tuple(terms), envelope=envelope, after_rms_um=round(after_um, 3),
@@ -132,7 +132,8 @@ def _where(spot: Spot, actuators: Sequence[str]) -> str:
     return f"tip {_AXES[spot.index]}"
 
 
-def _where_of(part: LawPart) -> str:
+def where_of(part: LawPart) -> str:
+    """Tip and axis, or stage and target, of a part."""
     return f"tip {part.axis}" if part.axis else f"{part.stage} {part.target}"
 
 

@@ -1,8 +1,7 @@
 """The search for a law: forward selection over all terms, shapes refined, small sets tried exhaustively.
 
-A term enters where it makes withheld runs more probable and where chance hardly could: its gain in evidence has to exceed what
-the best of all terms gains when the signs of stretches of the residual are drawn at random (a false law in FALSE_RATE of such
-data). Source: forward selection as in sparse regression of dynamics; wild bootstrap of the maximum.
+A term enters where it makes withheld runs more probable by more than its prior odds: all kinds of terms at all spots are
+equally likely, and a shape was looked for among many. Source: forward selection as in sparse regression of dynamics.
 """
 
 from __future__ import annotations
@@ -93,7 +92,7 @@ class _Search:
         self.base, self.split = base, usual_split(len(bench.bench.runs))
         self.folds = base(self.split, True)
         self.bench, self.grids, self.floor_mm = bench, grids, floor_mm
-        self.screen = Screen(grids, self.folds, np.random.default_rng(0))
+        self.screen = Screen(grids, self.folds)
         self.shapes = Shapes(bench)
         self.per_term = float(np.log(len({Term(s, f).kind for grid in grids for s in grid.spots for f in grid.forms})))
 
@@ -103,9 +102,7 @@ class _Search:
         score = 0.0
         while len(chosen) < MOST_TERMS:
             step = self._beside(chosen)
-            ranked, threshold = self.screen.gains(step)
-            if not ranked or ranked[0][0] < threshold:
-                break
+            ranked = [each for each in self.screen.gains(step) if each[0] > 0.0]
             fine = [self._refined(step, term) for _, term in self._leaders(ranked)]
             fine += [self._refined(step, Term(spot, t.form)) for t in chosen for spot in self._spots_beside(t)]
             if not fine:

@@ -17,7 +17,6 @@ from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats, Ints
 
 PARTS = 4  # that are withheld: runs, or stretches of fewer runs
-WIDE_MM = 0.2  # what a law may move the tip by, standard deviation before any data
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,19 +141,6 @@ class Folds:
         M = A + np.diag(self.precision)
         return np.asarray(np.linalg.cholesky(M + 1e-12 * np.diag(np.diag(M))))
 
-    def rest(self) -> list[Floats]:
-        """White residual (w,) per run that the base leaves, all data together."""
-        mean = solve_triangular(self._halves[0].T, self._targets[0], lower=False)
-        out = []
-        for k, (r, W) in enumerate(zip(self.residual, self.white, strict=True)):
-            left, at = r - W @ mean[: W.shape[1]], W.shape[1]
-            for each in self.more:
-                X = each.columns[k]
-                left[each.rows[k]] -= X @ mean[at : at + X.shape[1]]
-                at += X.shape[1]
-            out.append(left)
-        return out
-
     def means(self, more: Sequence[White], precision: Floats) -> Floats:
         """Coordinates (f, k) of the base, fitted jointly with law columns of that prior precision: with all data, and
         without each part.
@@ -175,13 +161,12 @@ class Folds:
         target = sum(X.T @ r[x.reach(k)] for k, (X, r) in enumerate(zip(x.columns, self.residual, strict=True)))
         return Products(self._cross(x), np.asarray(target), _grams(x.columns, count), count, len(self.more))
 
-    def alone(self, x: White, products: Products) -> tuple[Floats, Floats, Floats]:
-        """Columns (c) with the base taken out, all data: G (f, count, count) and h (f, count) of those that belong together,
-        and what takes the base out of their products with other rows (k, c).
-        """
-        half = self._halved(np.concatenate([products.cross, self._cross(x, first=products.more)]))
+    def alone(self, x: White, products: Products) -> tuple[Floats, Floats]:
+        """Columns (c) with the base taken out, all data: G (f, count, count) and h (f, count) of those that belong together."""
+        cross = np.concatenate([products.cross, self._cross(x, first=products.more)])
+        half = solve_triangular(self._halves[0], cross, lower=True)
         h = (products.target - half.T @ self._targets[0]).reshape(-1, products.count)
-        return products.own - _grams([half], products.count), h, half
+        return products.own - _grams([half], products.count), h
 
     def _cross(self, x: White, *, first: int | None = None) -> Floats:
         """Products (k, c) of the base's columns with columns of a spot: of all, or from number `first` of those that stand apart on."""
@@ -195,15 +180,6 @@ class Folds:
             near = each.over(k, low, high)
             parts.append((near if isinstance(rows, slice) else near[rows - low]).T @ X)
         return np.concatenate(parts) if parts else np.zeros((0, X.shape[1]))
-
-    def _halved(self, cross: Floats) -> Floats:
-        """Products (k, c) with the base divided by the root of its precision: what its columns take is half.T @ half."""
-        return np.asarray(solve_triangular(self._halves[0], cross, lower=True))
-
-    def projected(self, draws: Sequence[Floats]) -> Floats:
-        """White residuals (w, b) per run against the base (k, b)."""
-        every = White(tuple(np.arange(len(e)) for e in draws), tuple(draws))
-        return self._halved(self._cross(every))
 
     def together(self, xs: Sequence[White]) -> tuple[Floats, Floats]:
         """Columns (c) of several spots, one behind the other, with the base taken out, for all data and for all but one part

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench
-from camcomp.diagnosis.law.folds import WIDE_MM, Folds, White, gains
+from camcomp.diagnosis.law.folds import Folds, White, gains
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.ground.datatypes import Floats
 
@@ -33,10 +33,10 @@ class Shapes:
     def _worked_out(self, term: Term) -> tuple[White, Floats]:
         values = self.bench.values(term.spot, term.form)
         if isinstance(term.form, SmoothForm):
-            size = term.form.width**-2.0
+            precision = np.full(term.form.size, term.form.width**-2.0)
         else:
-            size = float(np.mean(self.bench.rms(term.spot, values) ** 2)) / WIDE_MM**2 + 1e-12
-        return self.bench.white(term.spot, values), np.full(term.form.size, size)
+            precision = self.bench.precision(term.spot, values, term.form.size)[0]
+        return self.bench.white(term.spot, values), precision
 
     def followed(self, step: Folds, term: Term) -> Term:
         """The term with the shape that fits the data best in addition to the base."""
@@ -101,9 +101,7 @@ class Shapes:
         """Log evidence (f,) that forms of as many functions each add, each alone."""
         values, count = self.bench.values(spot, *forms), forms[0].size
         white = self.bench.white(spot, values)
-        G, h, _ = step.alone(white, step.products(white, count))
-        size = np.mean(self.bench.rms(spot, values).reshape(-1, count) ** 2, axis=1) / WIDE_MM**2 + 1e-12
-        return gains(G, h, np.repeat(size[:, None], count, axis=1))
+        return gains(*step.alone(white, step.products(white, count)), self.bench.precision(spot, values, count))
 
 
 def _moved(form: Form, i: int, at: float) -> Form:
