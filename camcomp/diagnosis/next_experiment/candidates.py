@@ -1,4 +1,4 @@
-"""Feasible experiments: a coarse grid of designs about the region of work, additional channels, and neighbours of a design.
+"""Feasible experiments: a coarse grid of designs about the region of work, and additional channels.
 
 In the air the tool stays above `Site.low`; it cuts only where the runs have cut, at their speed.
 """
@@ -22,7 +22,6 @@ FASTER = (0.25, 1.0, 4.0)  # times the feed of the runs, in the air
 CUT_FASTER = (0.5, 1.0, 1.5)  # times the feed of the runs, cutting
 OUT = (0.5, 0.9)  # of the reach: distances of circles
 SMALL = 0.3  # of the reach: radius of a distant circle; of the radius of work: that of a small one
-NEIGHBOUR_MM, NEIGHBOUR_TIMES = 12.0, 1.5  # steps to a neighbouring design
 _NEEDS = {
     "tip": ("the tip with a tracker", 30.0),
     "encoder": ("the set-points and the encoders", 5.0),
@@ -145,22 +144,6 @@ def single_changes(site: Site, room: Room) -> Iterator[Candidate]:
     centre = _triple(middle + (1.0 - SMALL) * far * ways[int(np.argmax(reaches))])
     yield _air(site, base, ("position",), centre=centre, radius=min(base.radius, SMALL * far))
     yield from in_time(site)
-
-
-def neighbours(site: Site, design: MotionDesign, step: float) -> Iterator[MotionDesign]:
-    """Designs next to one; step: 1 far to 0 near."""
-    for axis, sign in product(range(3), (1.0, -1.0)):
-        if not design.cutting:
-            moved = np.array(design.centre) + sign * step * NEIGHBOUR_MM * np.eye(3)[axis]
-            yield _in_air(site, replace(design, centre=_triple(moved)))
-    for factor in (NEIGHBOUR_TIMES**step, NEIGHBOUR_TIMES**-step):
-        radius, feed = factor * design.radius, factor * design.feed
-        if not design.cutting or (site.cut is not None and radius <= site.cut.radius):
-            yield _in_air(site, replace(design, radius=radius))
-        slowest, fastest = (CUT_FASTER if design.cutting else FASTER)[:: len(FASTER) - 1]
-        place = site.cut if design.cutting and site.cut is not None else site.work
-        if slowest * place.feed <= feed <= fastest * place.feed:
-            yield replace(design, feed=feed)
 
 
 def _reaches(site: Site, room: Room, base: MotionDesign) -> tuple[Floats, Floats, Floats]:

@@ -1,4 +1,4 @@
-"""Search for the next experiment: a coarse grid over position, plane, radius, feed, direction, load and dwell, then refinement.
+"""Search for the next experiment: the best of a grid over position, plane, radius, feed, direction, load and dwell.
 
 The objective is the information minus the price of machine time (`proposal.PRICE`), so that a short experiment with little
 information does not win. The search is deterministic.
@@ -16,9 +16,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.next_experiment.candidates import (
     Candidate,
     by_other_means,
-    candidate,
     coarse,
-    neighbours,
     single_changes,
 )  # fmt: skip
 from camcomp.diagnosis.next_experiment.design import MotionDesign
@@ -32,8 +30,6 @@ from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 from camcomp.model.job import Job
 
-STEPS = (1.0, 0.5)  # of the refinement
-MOST_REFINED = 16  # designs evaluated during refinement
 MOST_JUDGED_WHOLE = 3  # best designs evaluated with every effect of the library within its tolerance
 
 
@@ -65,24 +61,6 @@ class Desk:
             told=found,
         )
 
-    def refined(self, first: Proposal) -> Proposal:
-        """The best design near one, by steps of descent."""
-        best, looked, been = first, 0, {first.candidate.design}
-        for step in STEPS:
-            improved = True
-            while improved and looked < MOST_REFINED:
-                improved = False
-                for design in neighbours(self.site, best.candidate.design, step):
-                    design = design.tidy()
-                    if design in been or looked >= MOST_REFINED or not self.within(design):
-                        continue
-                    been.add(design)
-                    looked += 1
-                    other = self.judged(candidate(self.site, design, best.candidate.varies))
-                    if other is not None and other.value > best.value:
-                        best, improved = other, True
-        return best
-
     def within(self, design: MotionDesign) -> bool:
         """Whether the design is within reach of the machine and within `Site.farther` of the work."""
         points = design.points()
@@ -105,12 +83,7 @@ def propose(problem: Problem, rivals: Sequence[Fitted], probability: Floats, job
     if len(rivals) == 1 and most_narrowed(desk.question, desk.weight) <= WORTH:
         return None
     found = ranked(desk, (*coarse(desk.site, desk.room), *by_other_means(desk.site)))
-    moving = next(
-        (each for each in found if not each.candidate.knows and each.candidate.channels == desk.site.channels), None
-    )
-    if moving is not None:
-        found.append(desk.refined(moving))
-    bench, found = problem.bench, sorted(found, key=lambda each: -each.value)
+    bench = problem.bench
     can = (each for each in found if can_be_run(each.candidate, bench.runs, job, bench.twin))
     whole = [desk.judged(each.candidate, whole=True) for each in islice(can, MOST_JUDGED_WHOLE)]
     worth = [each for each in whole if each is not None and each.gain > WORTH]
