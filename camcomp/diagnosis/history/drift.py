@@ -1,7 +1,7 @@
 """Course of a parameter over the days: steady, drift or jumps, and the day of its next measurement.
 
 Estimates of n days with known deviations are described by one value, a straight line, or values that change at up to
-MOST_JUMPS days. The Bayesian information criterion chooses (Schwarz 1978); a jump counts its day as a parameter (Yao 1988).
+MOST_JUMPS days. The Bayesian information criterion chooses (Schwarz 1978), a richer description by EQUAL_LOG_ODDS more; a jump counts its day as a parameter (Yao 1988).
 Least squares over all divisions by dynamic programming (Jackson et al. 2005).
 """
 
@@ -12,11 +12,11 @@ from typing import Literal
 
 import numpy as np
 
+from camcomp.diagnosis.model.classes import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
 MOST_JUMPS = 3
 FEWEST = 4  # measurements needed for a line or a jump
-_MARGIN = 4.0  # least difference of the criterion for a richer description: odds of 7 to 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ def course_of(days: Floats, values: Floats, deviations: Floats) -> Course:
     """The course of values (n,) with standard deviations (n,) measured at days (n,), in order of the days."""
     n, weight = len(days), 1.0 / np.maximum(deviations, 1e-300) ** 2
     line, misfit = _line(days, values, weight)
-    cost: list[tuple[float, Course]] = [(misfit + 2 * np.log(n) + _MARGIN, line)]
+    cost: list[tuple[float, Course]] = [(misfit + 2 * np.log(n) + 2.0 * EQUAL_LOG_ODDS, line)]
     for count, (starts, misfit) in enumerate(_steps(values, weight)):
         last = slice(starts[-1], n)
         own = Course(
@@ -44,7 +44,7 @@ def course_of(days: Floats, values: Floats, deviations: Floats) -> Course:
         )  # fmt: skip
         if n < FEWEST:
             return own
-        cost.append((misfit + (1 + 2 * count) * np.log(n) + _MARGIN * count, own))
+        cost.append((misfit + (1 + 2 * count) * np.log(n) + 2.0 * EQUAL_LOG_ODDS * count, own))
     return min(cost, key=lambda each: each[0])[1]
 
 

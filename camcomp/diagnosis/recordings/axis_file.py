@@ -7,10 +7,9 @@ import numpy as np
 from camcomp.diagnosis.recordings.mat_file import read_mat
 from camcomp.diagnosis.recordings.run_log import Actuators, Recording, Wishes, csv_of
 from camcomp.diagnosis.recordings.sampled import reading
+from camcomp.ground.bounds import LARGEST_NUMBER
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.motion.log_columns import TIME, log_columns
-
-MOST = 1e12  # s or m, beyond every recording
 
 
 def read_axis(
@@ -33,7 +32,7 @@ def read_axis(
         found["t"]
     ):
         raise ConfigError("CC423", "t, qg, qm and vir are not of one length", at=at)
-    if not all((np.abs(found[key]) < MOST).all() for key in ("t", "qg", "qm")):
+    if not all((np.abs(found[key]) < LARGEST_NUMBER).all() for key in ("t", "qg", "qm")):
         raise ConfigError("CC423", "t, qg or qm holds what is no time or place", at=at)
     target = actuator or next(iter(actuators))
     if target not in actuators:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.diagnosis.recordings.sampled import SampledColumns
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.motion.log_columns import LINE
@@ -22,26 +23,30 @@ _COMMON = 0.5  # of the shorter part's span: least overlap of a common clock
 
 @dataclass(frozen=True, eq=False)
 class SampledTable:
-    """Columns of a log sampled together: time (n,) s ascending or None, values (n,) by name."""
+    """Columns of a log sampled together: time (n,) s ascending or None, values (n,) by name, row (n,) of each in the source.
 
-    file: str
+    leading: has positions or coordinates; other parts are interpolated to its rows.
+    """
+
+    source: SampledColumns
     time: Floats | None
     values: Mapping[str, Floats]
-    leading: bool  # has positions or coordinates: other parts are interpolated to its rows
+    row: Ints
+    leading: bool
 
     @property
     def rows(self) -> int:
         """Number of rows."""
-        return len(next(iter(self.values.values())))
+        return len(self.row)
 
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """One table. row (n,): of the leading part; lead: its number."""
+    """One table. row (n,): of the source of the leading part."""
 
     time: Floats | None
     values: dict[str, Floats]
-    lead: int
+    source: SampledColumns
     row: Ints
     notes: tuple[str, ...]
 
@@ -49,15 +54,15 @@ class Joined:
 def join(parts: Sequence[SampledTable], by: str | None) -> Joined:
     """Join parts on common rows; by: "time", "rows" or None for the first possible one. Raises ConfigError CC453."""
     if len(parts) == 1:
-        return Joined(parts[0].time, dict(parts[0].values), 0, np.arange(parts[0].rows), ())
-    files = {part.file for part in parts}
+        return Joined(parts[0].time, dict(parts[0].values), parts[0].source, parts[0].row, ())
+    files = {part.source.file for part in parts}
     alike = len({part.rows for part in parts}) == 1
     if by == "rows" or (by is None and len(files) == len(parts) and alike):
         if not alike:
             _refuse(parts, f"{' and '.join(str(part.rows) for part in parts)} rows cannot be joined row by row")
         time = next((part.time for part in parts if part.time is not None), None)
         values = {name: each for part in parts for name, each in part.values.items()}
-        return Joined(time, values, 0, np.arange(parts[0].rows), (f"joined row by row: {_files(parts)}",))
+        return Joined(time, values, parts[0].source, parts[0].row, (f"joined row by row: {_files(parts)}",))
     return _on_time(parts)
 
 
@@ -87,10 +92,10 @@ def _on_time(parts: Sequence[SampledTable]) -> Joined:
     if not len(row):
         _refuse(parts, "no rows of the parts belong to the same time")
     how = "nearest in time" if poses else "on time"
-    note = f"joined {how}, on the rows of {parts[lead].file}: {_files(parts)}"
+    note = f"joined {how}, on the rows of {parts[lead].source.file}: {_files(parts)}"
     lost = parts[lead].rows - len(row)
     notes = (note, f"{lost} rows outside the common time dropped") if lost else (note,)
-    return Joined(base[row], values, lead, row, notes)
+    return Joined(base[row], values, parts[lead].source, parts[lead].row[row], notes)
 
 
 def _step(time: Floats) -> float:
@@ -118,8 +123,8 @@ def _between(time: Floats, values: Floats, wanted: Floats, held: bool) -> Floats
 
 
 def _files(parts: Sequence[SampledTable]) -> str:
-    return ", ".join(dict.fromkeys(part.file for part in parts))
+    return ", ".join(dict.fromkeys(part.source.file for part in parts))
 
 
 def _refuse(parts: Sequence[SampledTable], message: str) -> None:
-    raise ConfigError("CC453", f"{message}: {_files(parts)}", at=Location(parts[-1].file, 1, 1))
+    raise ConfigError("CC453", f"{message}: {_files(parts)}", at=Location(parts[-1].source.file, 1, 1))

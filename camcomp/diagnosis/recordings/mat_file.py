@@ -15,9 +15,7 @@ import numpy as np
 from camcomp.ground.csv_table import MOST_TABLE_BYTES
 from camcomp.ground.datatypes import Floats
 
-_HEADER, _MATRIX, _COMPRESSED = 128, 14, 15  # bytes; types of data elements
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-_NUMERIC_CLASSES = range(6, 16)  # mxDOUBLE_CLASS to mxUINT64_CLASS
 _HDF5 = b"MATLAB 7.3"
 
 
@@ -37,9 +35,9 @@ def read_mat(data: bytes) -> dict[str, Floats]:
     if order is None:
         raise ValueError("it has no header of level 5")
     found: dict[str, Floats] = {}
-    for each in _elements(memoryview(data)[_HEADER:], order):
+    for each in _elements(memoryview(data)[128:], order):
         inside = [each]
-        if each.kind == _COMPRESSED:
+        if each.kind == 15:  # miCOMPRESSED
             unpacker = zlib.decompressobj()
             try:
                 unpacked = unpacker.decompress(each.data, MOST_TABLE_BYTES)
@@ -49,7 +47,7 @@ def read_mat(data: bytes) -> dict[str, Floats]:
                 raise ValueError("a variable is too large")
             inside = list(_elements(memoryview(unpacked), order))
         for one in inside:
-            if one.kind == _MATRIX and (named := _array(one.data, order)) is not None:
+            if one.kind == 14 and (named := _array(one.data, order)) is not None:  # miMATRIX
                 found[named[0]] = named[1]
     return found
 
@@ -64,7 +62,7 @@ def _elements(data: memoryview, order: str) -> Iterator[_Element]:
             start, after = at + 4, at + 8
         else:
             start = at + 8
-            after = start + size + (-size % 8 if kind != _COMPRESSED else 0)
+            after = start + size + (-size % 8 if kind != 15 else 0)
         if start + size > len(data) or (start == at + 4 and size > 4):
             raise ValueError("a variable ends behind the file")
         yield _Element(kind, data[start : start + size])
@@ -72,12 +70,15 @@ def _elements(data: memoryview, order: str) -> Iterator[_Element]:
 
 
 def _array(data: memoryview, order: str) -> tuple[str, Floats] | None:
-    """Name and numbers of a matrix; None for text, cells, structures and sparse ones. Raises ValueError."""
+    """Name and numbers of a matrix; None for text, cells, structures and sparse ones. Raises ValueError.
+
+    Classes 6 to 15, mxDOUBLE_CLASS to mxUINT64_CLASS, are numbers.
+    """
     inside = list(_elements(data, order))
     if len(inside) < 3 or len(inside[0].data) < 4:
         raise ValueError("a variable is damaged")
     flags, shape, name, *parts = inside
-    if struct.unpack_from(f"{order}I", flags.data)[0] & 0xFF not in _NUMERIC_CLASSES or not parts:
+    if struct.unpack_from(f"{order}I", flags.data)[0] & 0xFF not in range(6, 16) or not parts:
         return None
     lengths = np.frombuffer(shape.data[: len(shape.data) // 4 * 4], f"{order}i4")
     size = np.dtype(_NUMBERS.get(parts[0].kind, "f8")).itemsize

@@ -20,7 +20,6 @@ from camcomp.ground.errors import ConfigError, Location
 
 _WHAT = "an MCAP file"
 _LONGEST = 64  # longer lists of numbers are images or point clouds
-_DEEPEST = 12
 _IN_SI = ("ros2", "foxglove.")  # encodings and families of schemas whose lengths are m
 _NAMES = ("child_frame_id", "name", "joint_name")
 _NOT_FIELDS = ("header", "stamp", "timestamp")
@@ -48,7 +47,7 @@ def read_mcap(data: bytes, name: str) -> list[SampledColumns]:
                 unread[topic] = channel.message_encoding
                 continue
             content = decode(message.data)
-            rows.setdefault(topic, []).append(dict(_numbers(content, topic, 0)))
+            rows.setdefault(topic, []).append(dict(_numbers(content, topic)))
             times.setdefault(topic, []).append((_stamp(content), 1e-9 * message.log_time))
             family = (schema.encoding, schema.name) if schema is not None else ("", "")
             in_si[topic] = family[0].startswith(_IN_SI[0]) or family[1].startswith(_IN_SI[1])
@@ -85,13 +84,13 @@ def _fields(content: Any) -> dict[str, Any] | None:
     return None
 
 
-def _numbers(content: Any, path: str, depth: int) -> Iterator[tuple[str, float]]:
+def _numbers(content: Any, path: str) -> Iterator[tuple[str, float]]:
     """Every number in a message, with its path."""
     if isinstance(content, Real):
         yield path, float(content)
         return
     fields = _fields(content)
-    if fields is not None and depth < _DEEPEST:
+    if fields is not None:
         labels: Any = fields.get("name")
         for key, value in fields.items():
             if key in _NOT_FIELDS:
@@ -99,10 +98,10 @@ def _numbers(content: Any, path: str, depth: int) -> Iterator[tuple[str, float]]
             if _parallel(labels, value):
                 yield from ((f"{path}.{key}.{a}", float(b)) for a, b in zip(labels, value, strict=True))
             else:
-                yield from _numbers(value, path if key in ("transforms", "transform") else f"{path}.{key}", depth + 1)
-    elif _is_list(content) and len(content) <= _LONGEST and depth < _DEEPEST:
+                yield from _numbers(value, path if key in ("transforms", "transform") else f"{path}.{key}")
+    elif _is_list(content) and len(content) <= _LONGEST:
         for i, member in enumerate(content):
-            yield from _numbers(member, f"{path}.{_label(member, i)}", depth + 1)
+            yield from _numbers(member, f"{path}.{_label(member, i)}")
 
 
 def _is_list(content: Any) -> bool:

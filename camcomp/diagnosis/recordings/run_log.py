@@ -25,7 +25,6 @@ from camcomp.model.config.robot import PrismaticActuator, RevoluteActuator
 from camcomp.model.motion.log_columns import LINE, TIME, LogColumns, log_columns
 
 Actuators = Mapping[str, PrismaticActuator | RevoluteActuator]
-_TWO_TURNS = 4.0 * np.pi  # rad, beyond every joint of an arm: larger angles are degrees
 
 
 @dataclass(frozen=True)
@@ -60,14 +59,11 @@ def log_of(name: str, sampled: Sequence[SampledColumns], actuators: Actuators, w
     picked = pick_columns(sampled, list(actuators), columns, wishes.columns)
     check_enough(sampled, picked, columns, program=wishes.program)
     notes = [note for part in sampled for note in part.notes] + picked.notes
-    parts, numbers, order = _parts(sampled, picked, columns, notes)
-    joined = join(parts, wishes.join)
+    joined = join(_parts(sampled, picked, columns, notes), wishes.join)
     notes += joined.notes
-    lead = sampled[numbers[joined.lead]]
-    row = order[joined.lead][joined.row]
     values = _in_rad(_without_dead_encoders(joined.values, columns, notes), columns, picked, wishes.degrees, notes)
     driven = wishes.program or any(log in values for log in columns.setpoint)
-    time, keep = _times(joined, values, row=row, lead=lead, driven=driven, period_s=wishes.period_s, notes=notes)
+    time, keep = _times(joined, driven, wishes.period_s, notes)
     keep = _thinned(keep, wishes.rows, notes)
     notes += unused_column_notes(sampled, picked)
     table = {TIME: time[keep]}
@@ -88,15 +84,14 @@ def csv_of(columns: Mapping[str, Floats]) -> bytes:
 
 def _parts(
     sampled: Sequence[SampledColumns], picked: Picked, columns: LogColumns, notes: list[str]
-) -> tuple[list[SampledTable], list[int], list[Ints]]:
-    """Parts with assigned columns, index of each in `sampled`, and its rows that are kept."""
+) -> list[SampledTable]:
+    """Parts with assigned columns, and their rows that are kept."""
     several = len({each.part for each in picked.columns.values()}) > 1
-    parts, numbers, order = [], [], []
+    parts = []
     for k, source in enumerate(sampled):
-        wanted = {log: each for log, each in picked.columns.items() if each.part == k}
-        if not wanted:
+        values = {log: _read(source, each) for log, each in picked.columns.items() if each.part == k}
+        if not values:
             continue
-        values = {log: _read(source, each) for log, each in wanted.items()}
         time = _clock(source, k, picked)
         there = np.any([np.isfinite(each) for log, each in values.items() if log != LINE or len(values) == 1], axis=0)
         _say(notes, int((~there).sum()), "rows without values dropped", source)
@@ -108,17 +103,11 @@ def _parts(
             raise ConfigError("CC422", "no row holds numbers in the columns that count", at=source.at(-1, 0))
         if several and time is not None:
             rows = rows[np.argsort(time[rows], kind="stable")]
+        leading = any(log in ("x_mm", *columns.setpoint, *columns.encoder) for log in values)
         kept = {log: each[rows] for log, each in values.items()}
-        parts.append(
-            SampledTable(source.file, None if time is None else time[rows], kept, bool(_places(kept, columns)))
-        )
-        numbers.append(k)
-        order.append(rows)
-    return parts, numbers, order
-
-
-def _places(values: Mapping[str, Floats], columns: LogColumns) -> list[str]:
-    return [log for log in values if log in ("x_mm", *columns.setpoint, *columns.encoder)]
+        time = None if time is None else time[rows]
+        parts.append(SampledTable(source=source, time=time, values=kept, row=rows, leading=leading))
+    return parts
 
 
 def _read(source: SampledColumns, pick: Pick) -> Floats:
@@ -140,7 +129,7 @@ def _clock(source: SampledColumns, part: int, picked: Picked) -> Floats | None:
 def _in_rad(
     values: dict[str, Floats], columns: LogColumns, picked: Picked, degrees: bool | None, notes: list[str]
 ) -> dict[str, Floats]:
-    """Values with joint angles in rad; angles without a stated unit may be degrees."""
+    """Values with joint angles in rad; angles without a stated unit are degrees beyond two turns."""
     angles = [
         log for log in (*columns.setpoint, *columns.encoder, *columns.load)
         if log in values and log.endswith("_rad") and (degrees or picked.columns[log].factor is None)
@@ -148,7 +137,7 @@ def _in_rad(
     if not angles or degrees is False:
         return values
     largest = max(float(np.nanmax(np.abs(values[log]), initial=0.0)) for log in angles)
-    if not degrees and largest <= _TWO_TURNS:
+    if not degrees and largest <= 4.0 * np.pi:
         return values
     why = "--degrees" if degrees else f"they go up to {largest:.4g}; --radians if they are not"
     notes.append(f"joint angles are read as degrees: {why}")
@@ -167,18 +156,9 @@ def _without_dead_encoders(values: dict[str, Floats], columns: LogColumns, notes
     return {name: each for name, each in values.items() if name not in dead}
 
 
-def _times(
-    joined: Joined,
-    values: Mapping[str, Floats],
-    *,
-    row: Ints,
-    lead: SampledColumns,
-    driven: bool,
-    period_s: float | None,
-    notes: list[str],
-) -> tuple[Floats, Ints]:
+def _times(joined: Joined, driven: bool, period_s: float | None, notes: list[str]) -> tuple[Floats, Ints]:
     """Seconds since the earliest row (n,), and the rows that are kept. Raises ConfigError CC405 for decreasing times."""
-    n = len(next(iter(values.values())))
+    row, n = joined.row, len(joined.row)
     if joined.time is None:
         if period_s is None:
             notes.append("no usable times, t_s is the number of the row")
@@ -189,12 +169,12 @@ def _times(
     keep = np.arange(n)
     if driven:
         keep = np.flatnonzero(np.concatenate(([True], np.diff(time) != 0.0)))
-        _say(notes, n - len(keep), "rows of a time that was there before dropped", lead)
+        _say(notes, n - len(keep), "rows of a time that was there before dropped", joined.source)
         back = np.flatnonzero(np.diff(time[keep]) < 0.0)
         if len(back):
             first, second = time[keep[back[0] : back[0] + 2]]
             message = f"time goes back by {first - second:g} s"
-            raise ConfigError("CC405", message, at=lead.at(int(row[keep[back[0] + 1]]), 0))
+            raise ConfigError("CC405", message, at=joined.source.at(int(row[keep[back[0] + 1]]), 0))
     return time, keep
 
 

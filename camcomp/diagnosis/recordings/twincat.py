@@ -17,7 +17,6 @@ from camcomp.ground.errors import ConfigError, Location
 
 _CHANNELS, _UNIT = "Name", "Unit"
 _OF_CHANNELS = ("SymbolName", "SampleTime[ms]", "Data-Type")
-_FILE_TIME = 1e15  # beyond it times are steps of 100 ns since 1601, else ms
 
 
 def is_scope_text(data: bytes) -> bool:
@@ -62,9 +61,9 @@ def _begins_number(label: str) -> bool:
 
 
 def _times(table: CsvTable, column: int) -> Floats:
-    """Times (n,) s of one column of times."""
+    """Times (n,) s of one column: beyond 1e15 in steps of 100 ns since 1601, else in ms."""
     times = table.values([column])[:, 0]
-    scale = 1e-7 if np.isfinite(times).any() and np.nanmax(times) > _FILE_TIME else 1e-3
+    scale = 1e-7 if np.isfinite(times).any() and np.nanmax(times) > 1e15 else 1e-3
     return np.asarray(times * scale, float)
 
 

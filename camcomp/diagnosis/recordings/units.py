@@ -33,7 +33,6 @@ _CLOCK = re.compile(  # 11.10.2022 15:06:48.043, 2022-10-11T15:06:48,043Z, 15:06
     r"(?P<h>[01]?\d|2[0-3]):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)Z?",
     re.ASCII,
 )
-_STAMP = (1e13, 1e14)  # 20200714163904
 _SINCE_1970 = ((1e12, 1e13, 1e-3), (1e15, 1e16, 1e-6))  # from, to, s: ms and us of this century
 
 
@@ -76,7 +75,7 @@ def seconds(stamps: Floats, factor: float | None) -> Floats | None:
             return stamps * scale
     if most < _SINCE_1970[0][0]:
         return stamps
-    if not (_STAMP[0] <= least and most < _STAMP[1]):
+    if not (1e13 <= least and most < 1e14):
         return None
     try:
         return np.array([_since_2000(each) for each in stamps])
