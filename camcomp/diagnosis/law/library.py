@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -68,18 +67,12 @@ class LearnedLaw:
         if any(load_of(name) not in (None, *actuators) for law in laws for name in law.shape.names):
             return None
         at = [None if part.target is None else list(actuators).index(part.target) for part, _ in pieces]
-        names = [p.name for p in self.parameters]
-        hooks = {"control": ("on_servo", _shift), "drive": ("on_drive", _shift)}
-        effect: dict[str, Any] = {
-            "__doc__": self.law.says, "TARGET": "machine", "SOURCE": _SOURCE, "STAGE": self.law.on, "PARAMETERS": self.parameters
-        }  # fmt: skip
-        stages = [law.on if law.on in hooks else "tip" for law in laws]
-        for stage in dict.fromkeys(stages):
-            every = zip(stages, names, laws, at, strict=True)
-            own = [(name, law, actuator) for on, name, law, actuator in every if on == stage]
-            hook, moves = hooks.get(stage, ("on_place", _move))
-            effect[hook] = staticmethod(partial(moves, own))
-        return CandidateCause(self.name, None, type("LearnedEffect", (), effect))
+        placed = [_Piece(p.name, law, j) for p, law, j in zip(self.parameters, laws, at, strict=True)]
+        stages = {"control": _OnControl, "drive": _OnDrive}
+        kinds = tuple(dict.fromkeys(stages.get(law.on, _OnTip) for law in laws))
+        effect = type("LearnedEffect", kinds, {"__doc__": self.law.says})(placed)
+        effect.STAGE, effect.PARAMETERS = self.law.on, self.parameters
+        return CandidateCause(self.name, None, effect)
 
     def entries(self, factors: Mapping[str, float]) -> list[dict[str, Any]]:
         """What puts the law to work in a machine file, its terms as large as found."""
@@ -96,25 +89,53 @@ class LearnedLaw:
         return out
 
 
-_Pieces = Sequence[tuple[str, EmpiricalLaw, int | None]]  # the factor's name, the law, and the index of its actuator
+@dataclass(frozen=True)
+class _Piece:
+    """A term at work: its factor's name, the law, and the index of its actuator."""
+
+    factor: str
+    law: EmpiricalLaw
+    actuator: int | None
 
 
-def _shift(pieces: _Pieces, values: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
-    """Values (n, m) of actuators with the pieces of one stage."""
-    out = values.copy()
-    for factor, law, actuator in pieces:
-        if p[factor] != 0.0:
-            out[:, actuator] += p[factor] * law.values(DriveRows(motion, int(actuator or 0)))
-    return out
+class _Learned:
+    """What effects of learned laws have in common."""
+
+    TARGET, SOURCE = "machine", _SOURCE
+    STAGE: str
+    PARAMETERS: tuple[Parameter, ...]
+
+    def __init__(self, pieces: Sequence[_Piece]) -> None:
+        self.pieces = pieces
+
+    def shifted(self, on: str, values: Floats, motion: Motion, p: Mapping[str, float]) -> Floats:
+        """Values (n, m) of actuators with the pieces on that stage."""
+        out = values
+        for each in self.pieces:
+            if each.law.on == on and each.actuator is not None and p[each.factor] != 0.0:
+                out = out.copy() if out is values else out
+                out[:, each.actuator] += p[each.factor] * each.law.values(DriveRows(motion, each.actuator))
+        return out
 
 
-def _move(pieces: _Pieces, tip: Floats, load: Load, motion: Motion, p: Mapping[str, float]) -> Floats:
-    """Tips (n, 3) in the program frame with the pieces that move them."""
-    rows, out = TipRows(tip, load, motion), tip.copy()
-    for factor, law, _ in pieces:
-        if p[factor] != 0.0:
-            out[:, law.axis] += p[factor] * law.values(rows)
-    return out
+class _OnControl(_Learned):
+    def on_servo(self, position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+        return self.shifted("control", position, motion, p)
+
+
+class _OnDrive(_Learned):
+    def on_drive(self, error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+        return self.shifted("drive", error, motion, p)
+
+
+class _OnTip(_Learned):
+    def on_place(self, tip: Floats, load: Load, motion: Motion, p: Mapping[str, float]) -> Floats:
+        rows, out = TipRows(tip, load, motion), tip
+        for each in self.pieces:
+            if each.actuator is None and p[each.factor] != 0.0:
+                out = out.copy() if out is tip else out
+                out[:, each.law.axis] += p[each.factor] * each.law.values(rows)
+        return out
 
 
 def _placed(part: LawPart, size: float) -> EmpiricalLaw:
