@@ -33,6 +33,7 @@ def opened(folder, *how):
     return made, open_experiment(folder / "experiment.yaml")
 
 
+@pytest.mark.campaign  # forces have some in the plain run
 def test_what_acts_in_one_run_alone_is_a_while_on_its_drive(tmp_path):
     made, files = opened(tmp_path, "disturbed_drive", "x", "router", 910021, 10.0, 130)
     done = diagnose(files.job, files.twin, files.runs, without=("disturbance",), stated_mm=0.003)

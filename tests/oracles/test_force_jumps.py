@@ -152,7 +152,7 @@ def job_for(truth: Truth, folder) -> Job:
 
 
 @pytest.mark.parametrize("model", FORCES)
-@pytest.mark.parametrize("arcs", [False, True])
+@pytest.mark.parametrize("arcs", [False, pytest.param(True, marks=pytest.mark.campaign)])
 def test_every_way_sees_the_same_force(tmp_path, monkeypatch, model, arcs):
     monkeypatch.setattr(runs, "PROBE_MOTIONS", 4)
     truth = Truth(model, 7 + arcs, arcs)

@@ -51,7 +51,6 @@ OFTEN = {("kuka-kr210", each) for each in ("joint_offset", "drive_stiffness", "c
 OFTEN |= {
     ("orthoglide", "cutting_force"),
     ("hexapod", "joint_offset"),
-    ("hexapod", "servo_lag"),
     ("cartesian", "backlash"),
     ("cartesian", "servo_lag"),
 }

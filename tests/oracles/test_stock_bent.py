@@ -155,7 +155,10 @@ def in_the_corner(free):
     return low
 
 
-@pytest.mark.parametrize(("spring", "corrected", "within"), [(600.0, False, 25e-3), (1000.0, True, 10e-3)])
+@pytest.mark.parametrize(
+    ("spring", "corrected", "within"),
+    [pytest.param(600.0, False, 25e-3, marks=pytest.mark.campaign), (1000.0, True, 10e-3)],
+)
 def test_a_corner_is_reached_over_a_line_shorter_than_the_way_on_which_the_bend_changes(
     tmp_path, monkeypatch, spring, corrected, within
 ):

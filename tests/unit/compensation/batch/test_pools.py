@@ -120,6 +120,7 @@ def cluster(tmp_path):
 
 
 @pytest.mark.filterwarnings("default")
+@pytest.mark.campaign  # processes of this machine have one in the plain run
 def test_a_worker_killed_in_a_cluster_loses_nothing(cluster):
     cluster.work(2)
     cluster.wait(2)
