@@ -186,7 +186,7 @@ def _scene(points: Floats) -> Json:
     ratio = dict(zip("xyz", (half / half.max()).round(6).tolist(), strict=True))
     ticks = {a: max(round(TICKS * share), 2) for a, share in ratio.items()}
     axes = {f"{a}axis": axis(f"{a} in mm", range=ranges[i], nticks=ticks[a]) for i, a in enumerate("xyz")}
-    return axes | {"aspectmode": "manual", "aspectratio": ratio, "camera": {"eye": {"x": 0.9, "y": -1.5, "z": 0.8}}}
+    return axes | {"aspectmode": "manual", "aspectratio": ratio, "camera": {"eye": {"x": 1.0, "y": -1.65, "z": 0.9}}}
 
 
 def _legs(robot: Robot, rho: Floats, rotation: Floats, reference: Floats) -> list[DrawnLeg]:

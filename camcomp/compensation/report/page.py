@@ -145,7 +145,8 @@ def _cards(
         if most:
             cards.append((what, f"{brief(most)} {unit}", ""))
     tilt = figures.platform_tilt_max_mrad
-    cards.append(("Platform tilt", f"{brief(tilt)} mrad", "not corrected with three actuators" if tilt > 1e-6 else ""))
+    left = tilt > 1e-6 and figures.tilt_after_mrad is None
+    cards.append(("Platform tilt", f"{brief(tilt)} mrad", "X, Y and Z do not correct it" if left else ""))
     cards.append(("Joining lines", str(figures.joining_lines), "where the correction jumps"))
     cards += _travel(drawn, rho, job)
     cards.append(("Warnings", str(warnings), "read them below" if warnings else "nothing to look at"))
