@@ -23,7 +23,7 @@ _TO_LOG = {  # unit of the log: factors to it, by unit of the recording in lower
     },
     "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
     "N": {"n": 1.0, "kn": 1e3},
-    "Nmm": {"nmm": 1.0, "nm": 1e3, "n·m": 1e3, "n m": 1e3, "n mm": 1.0, "knm": 1e6},
+    "Nmm": {"nmm": 1.0, "nm": 1e3, "n·m": 1e3, "n.m": 1e3, "n*m": 1e3, "n m": 1e3, "n mm": 1.0, "knm": 1e6},
     "C": {"c": 1.0, "°c": 1.0, "degc": 1.0},
 }
 _BASE = {"mm": "m", "rad": "rad", "s": "s", "N": "n", "Nmm": "nm", "C": "c"}

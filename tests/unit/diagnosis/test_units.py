@@ -22,6 +22,8 @@ FACTORS = [  # column of a log, unit of theirs, what one of theirs is in the log
     ("fx_N", "kN", 1000.0),
     ("act_A1_Nmm", "Nm", 1000.0),
     ("act_A1_Nmm", "N·m", 1000.0),
+    ("act_A1_Nmm", "N.m", 1000.0),
+    ("act_A1_Nmm", "N*m", 1000.0),
     ("act_A1_Nmm", "Nmm", 1.0),
 ]
 
