@@ -164,6 +164,7 @@ class Field:
         self.corner = middle - 0.5 * CELL_MM
         self.solved = 0  # exact solutions so far
         self.worst = 0.0  # mm, largest error at test points of the new tiles
+        self._narrower: list[tuple[tuple[Any, ...], Tiles, Tiles]] = []  # of ranges before: key, tiles, as loaded
         self._set_range(force)
 
     def _set_range(self, force: Floats) -> None:
@@ -195,8 +196,9 @@ class Field:
 
     def keep(self, sound: bool) -> None:
         """Keep the tiles for later programs; sound: a sample of the program agrees with exact solutions."""
-        if self._files is not None and (self.tiles is not self._loaded or not sound):
-            self._files.save(self._key, vars(self.tiles) if sound else None)
+        for key, tiles, loaded in (*self._narrower, (self._key, self.tiles, self._loaded)):
+            if self._files is not None and (tiles is not loaded or not sound):
+                self._files.save(key, vars(tiles) if sound else None)
 
     def proof(self, gaps: tuple[Floats, ...], joints: Floats, drive: Floats, solved: int) -> Interpolation:
         """Result of a check by points (k,) solved exactly; keeps the tiles if they are good enough.
@@ -225,6 +227,7 @@ class Field:
         """Makes the tiles for points (n, 3) and forces (n, 3) that are going to be asked for; the points as look_up wants them."""
         tips = tips - self.corner
         if len(force) and ((force < self.low - 1e-9).any() or (force > self.high + 1e-9).any()):
+            self._narrower.append((self._key, self.tiles, self._loaded))
             self._set_range(np.concatenate((force, [self.low, self.high])))
         room = np.empty(len(tips), np.int64)
         for _ in range(LEVELS + 1):

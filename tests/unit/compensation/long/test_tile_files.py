@@ -42,6 +42,17 @@ def test_the_next_program_finds_the_cubes_and_gets_the_same_answers(router, fold
     assert all((a == b).all() for a, b in zip(again[0], answers[0], strict=True)) and (again[1] == answers[1]).all()
 
 
+def test_cubes_of_a_range_of_forces_that_became_wider_are_kept_too(router, folder):
+    def run():
+        known = field(router, 0.1 * FORCE)
+        ask(known, TARGET, 0.1 * FORCE)
+        ask(known, TARGET, FORCE)
+        known.keep(sound=True)
+        return known.solved
+
+    assert run() > 0 == run()
+
+
 def test_figures_count_the_cubes_of_this_program_only(router, folder):
     _, known = kept(router)
     later = field(router)
