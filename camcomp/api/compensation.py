@@ -84,9 +84,7 @@ class CompensatedProgram:
         """One HTML page with plots. Raises ConfigError CC216 without the plot library."""
         from camcomp.compensation.report.page import compensation_html
 
-        return compensation_html(
-            self.outcome, self.machine, self.summary, failed=self.failed, tolerance_um=self.tolerance_um, inputs=inputs
-        )
+        return compensation_html(self.outcome, self._totals, self.tolerance_um, inputs)
 
 
 def compensate(

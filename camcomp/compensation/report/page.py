@@ -7,8 +7,9 @@ from pathlib import PurePath
 
 import numpy as np
 
-from camcomp.compensation.program.compensate import Compensated, Trajectories, trajectories
+from camcomp.compensation.program.compensate import Compensated, trajectories
 from camcomp.compensation.program.result import LineResult, Summary
+from camcomp.compensation.program.totals import Totals
 from camcomp.compensation.program.verify import Verified, verify
 from camcomp.compensation.report.band_section import band_section
 from camcomp.compensation.report.figures import (
@@ -39,25 +40,17 @@ BUDGET = (
 )
 
 
-def compensation_html(
-    result: Compensated,
-    job: Job,
-    figures: Summary,
-    *,
-    failed: Sequence[tuple[str, str]],
-    tolerance_um: float,
-    inputs: Sequence[Input],
-) -> bytes:
-    """One HTML file. figures: camcomp.report.tables.summary; failed: rule ids and texts of failed checks.
+def compensation_html(result: Compensated, totals: Totals, tolerance_um: float, inputs: Sequence[Input]) -> bytes:
+    """One HTML file.
 
     The trajectories are solved here, and the corrected program is read back from its text and verified. Raises
     ConfigError CC216 when the plot library is not installed.
     """
+    job, figures, failed = totals.job, totals.summary(), totals.failed_checks(tolerance_um)
     written = read_program(
         result.written.data, name=result.program.name, setup=setup_of(job.config), dialect=result.program.dialect
     )
     checked = verify(written, result.program, job)
-    found = trajectories(result, job)
     drawn = drawn_path_of(result, job)
     name = PurePath(result.program.name).name
     before, after = figures.before.max_um, figures.after.max_um
@@ -80,7 +73,7 @@ def compensation_html(
     if any_feed:
         if result.bands is not None:
             sections.append(band_section(drawn, result.bands, figures))
-        sections += _plots(result=result, found=found, job=job, drawn=drawn, checked=checked, tolerance_um=tolerance_um)
+        sections += _plots(result, job, drawn, checked=checked, tolerance_um=tolerance_um)
         programs = [("original program", result.program), ("corrected program", written)]
         if walls := wall_section(job, result.program, programs):
             sections.append(walls)
@@ -93,9 +86,11 @@ def compensation_html(
         verdict=verdict,
         good=not failed,
         caution=_caution(figures, tolerance_um),
-        cards=_cards(
-            figures=figures, tolerance_um=tolerance_um, drawn=drawn, rho=result.state.rho, job=job, warnings=len(notes)
-        ),
+        cards=[
+            *_cards(figures, tolerance_um),
+            *_travel(drawn, result.state.rho, job),
+            ("Warnings", str(len(notes)), "read them below" if notes else "nothing to look at"),
+        ],
         sections=sections,
     )
     return render(page)
@@ -112,20 +107,12 @@ def _caution(figures: Summary, tolerance_um: float) -> str:
     return f"{where}: this mode is assumed. State it as control: path_mode, and the program is written for it."
 
 
-def _cards(
-    figures: Summary, tolerance_um: float, drawn: DrawnPath, rho: Floats, job: Job, warnings: int
-) -> list[tuple[str, str, str]]:
-    cards = [
-        (
-            "Tip error before",
-            f"{micrometres(figures.before.max_um)}",
-            f"rms {micrometres(figures.before.rms_um)}",
-        ),
-        ("Tip error after", f"{micrometres(figures.after.max_um)}", f"tolerance {tolerance_um:g} µm"),
-    ]
+def _cards(figures: Summary, tolerance_um: float) -> list[tuple[str, str, str]]:
     mode = figures.control_mode + ("" if figures.control_mode_stated else " (assumed)")
-    times = figures.cycle_time_s
-    cards += [
+    times, before = figures.cycle_time_s, figures.before
+    cards = [
+        ("Tip error before", f"{micrometres(before.max_um)}", f"rms {micrometres(before.rms_um)}"),
+        ("Tip error after", f"{micrometres(figures.after.max_um)}", f"tolerance {tolerance_um:g} µm"),
         (f"As the controller drives, {mode}", f"{micrometres(figures.under_control.max_um)}",
          f"tip error, rms {micrometres(figures.under_control.rms_um)}; with the corners that it rounds, also at joining lines"),
         ("Cycle time", f"{brief(times.after)} s", f"before {brief(times.before)} s; with pauses (G4)"),
@@ -148,8 +135,6 @@ def _cards(
     left = tilt > 1e-6 and figures.tilt_after_mrad is None
     cards.append(("Platform tilt", f"{brief(tilt)} mrad", "X, Y and Z do not correct it" if left else ""))
     cards.append(("Joining lines", str(figures.joining_lines), "where the correction jumps"))
-    cards += _travel(drawn, rho, job)
-    cards.append(("Warnings", str(warnings), "read them below" if warnings else "nothing to look at"))
     return cards
 
 
@@ -168,28 +153,20 @@ def _travel(drawn: DrawnPath, rho: Floats, job: Job) -> list[tuple[str, str, str
     return [("Travel left", text, f"actuator {job.machine.actuators[a]}, line {drawn.line[row]}")]
 
 
-def _plots(
-    result: Compensated, found: Trajectories, job: Job, drawn: DrawnPath, checked: Verified, tolerance_um: float
-) -> list[Section]:
-    budget = Section(
-        name="budget",
-        title="Error budget",
-        text=[BUDGET],
-        figures=[figure_budget(checked, tolerance_um)] if checked.lines else [],
+def _plots(result: Compensated, job: Job, drawn: DrawnPath, checked: Verified, tolerance_um: float) -> list[Section]:
+    machine, found = figure_machine(result, job, drawn), trajectories(result, job)
+    paths, errors = (
+        [figure_trajectories(result, found), figure_path(drawn)],
+        [figure_error(drawn, tolerance_um), figure_shift(drawn)],
     )
-    machine = figure_machine(result, job, drawn)
+    actuators = [*figures_actuators(drawn, job, drive=False), *figures_actuators(drawn, job, drive=True)]
+    budget = [figure_budget(checked, tolerance_um)] if checked.lines else []
     return [
         *([Section(name="drawing", title="The machine", figures=[machine])] if machine else []),
-        Section(name="paths", title="Trajectories", figures=[figure_trajectories(result, found), figure_path(drawn)]),
-        Section(
-            name="errors", title="Tip error and shift", figures=[figure_error(drawn, tolerance_um), figure_shift(drawn)]
-        ),
-        Section(
-            name="actuators",
-            title="Actuators",
-            figures=[*figures_actuators(drawn, job, drive=False), *figures_actuators(drawn, job, drive=True)],
-        ),
-        budget,
+        Section(name="paths", title="Trajectories", figures=paths),
+        Section(name="errors", title="Tip error and shift", figures=errors),
+        Section(name="actuators", title="Actuators", figures=actuators),
+        Section(name="budget", title="Error budget", text=[BUDGET], figures=budget),
     ]
 
 
