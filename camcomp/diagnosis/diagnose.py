@@ -258,7 +258,7 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
             low, high = min(every), max(every)
         if name != "phase_rad":
             low, high = max(low, kinds[name].low), min(high, kinds[name].high)
-        out[name] = Estimate(value=_round(value), ci95=(_round(low), _round(high)))
+        out[name] = Estimate.stated(value, low, high)
     return out
 
 
@@ -273,10 +273,6 @@ def _idle_shapes(problem: Problem, cause: Cause) -> set[str]:
 
 def _heat_logged(problem: Problem) -> bool:
     return all(run.run_path.temperature is not None for run in problem.bench.runs)
-
-
-def _round(value: float) -> float:
-    return float(f"{value:.6g}")
 
 
 def _alternatives(problem: Problem, found: CauseSearch) -> tuple[tuple[NamedCause, ...], ...]:

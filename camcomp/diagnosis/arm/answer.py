@@ -41,6 +41,7 @@ from camcomp.diagnosis.result.types import (
     PosesToMeasure,
     UnknownCause,
     Where,
+    six_digits,
 )
 from camcomp.ground.datatypes import Floats
 
@@ -176,10 +177,10 @@ def parameters_of(told: AnswerInputs, on: Sequence[int]) -> dict[str, Estimate]:
     for j in on:
         column = told.case.shelf.columns[j]
         p, spread = column.parameter, wide * float(np.sqrt(told.case.covariance[j, j]))
-        low, high = (_digits(p.value((told.case.amount[j] + s * spread) * p.scale)) for s in (-1.0, 1.0))
-        out[p.name] = Estimate(value=_digits(p.value(told.case.amount[j] * p.scale)), ci95=(low, high))
+        low, value, high = (p.value((told.case.amount[j] + s * spread) * p.scale) for s in (-1.0, 0.0, 1.0))
+        out[p.name] = Estimate.stated(value, low, high)
         for name, shape, first, last in column.shape:
-            out[name] = Estimate(value=_digits(shape), ci95=(_digits(first), _digits(last)))
+            out[name] = Estimate.stated(shape, first, last)
     return out
 
 
@@ -189,7 +190,7 @@ def _curve(told: AnswerInputs, cause: FoundCause, on: Sequence[int]) -> CurveCau
     found = curve_of(case.bench, [case.shelf.columns[j] for j in on], case.amount[on], case.covariance[np.ix_(on, on)])
     wide = 1.96 * calibration_of(told.kind).interval
     low, high = (max(found.amplitude + s * wide * found.amplitude_sd, 0.0) for s in (-1.0, 1.0))
-    size = Estimate(value=_digits(found.amplitude), ci95=(_digits(low), _digits(high)))
+    size = Estimate.stated(found.amplitude, low, high)
     out = CurveCause(
         effect=cause.effect,
         target=cause.target,
@@ -198,8 +199,8 @@ def _curve(told: AnswerInputs, cause: FoundCause, on: Sequence[int]) -> CurveCau
         parameters={"amplitude_rad": size},
         curve=ErrorCurve(
             angle_deg=tuple(found.angle),
-            error_rad=tuple(_digits(e) for e in found.error),
-            sd_rad=tuple(_digits(s) for s in found.sd),
+            error_rad=tuple(six_digits(e) for e in found.error),
+            sd_rad=tuple(six_digits(s) for s in found.sd),
             seen_deg=found.seen,
             seen_share=round(found.seen_share, 4),
         ),
@@ -485,7 +486,3 @@ def _size(parts: Sequence[Floats]) -> float:
 
 def _round(value: float) -> float:
     return round(float(value), 3)
-
-
-def _digits(value: float) -> float:
-    return float(f"{value:.6g}")

@@ -217,22 +217,14 @@ def share_lag(found: Sequence[AxisFindings]) -> None:
     common = float(weight @ value / weight.sum())
     if np.any(np.abs(value - common) > np.maximum(half, SAME_TIME_CONSTANT * abs(common))):
         return
+    spread = max(KNOWN * abs(common), float(weight.sum() ** -0.5), float(np.std(value)))
     together = FoundCause(
         effect="servo_lag",
         target=None,
         probability=min(c.probability for _, c in lags),
         share=float(sum(c.share for _, c in lags)),
-        parameters={
-            "time_constant_ms": _with_spread(
-                common, max(KNOWN * abs(common), float(weight.sum() ** -0.5), float(np.std(value)))
-            )
-        },
+        parameters={"time_constant_ms": Estimate.stated(common, common - spread, common + spread)},
     )
     for a, c in lags:
         a.causes.remove(c)
     lags[0][0].causes.append(together)
-
-
-def _with_spread(value: float, spread: float) -> Estimate:
-    low, high = (float(f"{value + sign * spread:.6g}") for sign in (-1.0, 1.0))
-    return Estimate(value=float(f"{value:.6g}"), ci95=(low, high))

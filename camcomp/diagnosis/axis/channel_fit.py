@@ -58,7 +58,7 @@ class ChannelFit:
         )
         value = float(w @ np.concatenate([*self.sizes.values()]))
         half = 1.96 * float(np.sqrt(max(w @ self.covariance @ w, 0.0)))
-        return _estimate(value, value - half, value + half)
+        return Estimate.stated(value, value - half, value + half)
 
 
 @dataclass(frozen=True, eq=False)
@@ -403,13 +403,13 @@ def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[
     for p, a, h in zip(term.parameters, amount.tolist(), half.tolist(), strict=True):
         low, value, high = (p.value(each * p.scale) for each in (a - h, a, a + h))
         if p.name in values:
-            out[p.name] = _estimate(value, low, high)
+            out[p.name] = Estimate.stated(value, low, high)
     if hasattr(term.module, "public"):
         ends = [term.cause(np.maximum(amount + sign * half, 0.0).tolist()).values for sign in (-1.0, 0.0, 1.0)]
         for name in term.module.public({p.name: p.nominal for p in term.module.FITTED}):
             if name not in term.shape:
                 low, value, high = (each[name] for each in ends)
-                out[name] = _estimate(value, low, high)
+                out[name] = Estimate.stated(value, low, high)
     for name in [each for each in term.shape if each in values and each not in term.switches]:
         value = term.shape[name]
         if name in term.known:
@@ -417,7 +417,7 @@ def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[
         else:
             factor = float(np.exp(1.96 * float(np.hypot(spreads[name], KNOWN))))
             low, high = value / factor, value * factor
-        out[name] = _estimate(value, low, high)
+        out[name] = Estimate.stated(value, low, high)
     return out
 
 
@@ -460,11 +460,6 @@ def _spreads_of_shapes(
     for place, (i, name) in enumerate(names):
         out.setdefault(i, {})[name] = float(np.sqrt(max(inverse[place, place], 0.0)) / size[place])
     return out
-
-
-def _estimate(value: float, low: float, high: float) -> Estimate:
-    low, value, high = (float(f"{each:.6g}") for each in (low, value, high))
-    return Estimate(value=value, ci95=(min(low, value), max(high, value)))
 
 
 def rows_together(left: Floats) -> float:

@@ -23,7 +23,6 @@ STRETCHES = 25  # of all runs, in which the size of a leftover is looked at
 STRETCH_S = 0.5  # in which a leftover is looked for
 FALSE = 0.01  # of the stretches that are named
 LEAST_STRETCHES = 8  # of which one can stand out
-JOINED = 0.1  # of a stretch between two that are one
 LEAST_ROWS = 20  # of a stretch
 WITHIN = 0.5  # rows: force and motion of one row are not known to be of one instant to better than that
 KNOWN = 0.01  # of the constants of a loop, and of friction: no law of them is better than that
@@ -123,13 +122,15 @@ def intervals(
     if inside is not None:
         out &= np.array([energy(inside[k][rows], floor) for k, rows in stretches]) > LOCAL * floor**2
     joined: list[Interval] = []
-    for (k, rows), e, on in zip(stretches, size, out, strict=True):
-        if not on:
-            continue
-        t0, t1, share = float(times[k][rows[0]]), float(times[k][rows[-1]]), float(e * len(rows)) / max(whole, 1e-300)
-        last = joined[-1] if joined else None
-        if last is not None and last.run == k and t0 - last.t1 < JOINED * STRETCH_S:
-            joined[-1] = Interval(k, last.t0, t1, last.share + share)
+    for i in np.flatnonzero(out).tolist():
+        k, rows = stretches[i]
+        t0, t1, share = (
+            float(times[k][rows[0]]),
+            float(times[k][rows[-1]]),
+            float(size[i] * len(rows)) / max(whole, 1e-300),
+        )
+        if i and out[i - 1] and joined[-1].run == k:  # the stretch before it
+            joined[-1] = Interval(k, joined[-1].t0, t1, joined[-1].share + share)
         else:
             joined.append(Interval(k, t0, t1, share))
     return tuple(joined), float(chances[out].min(initial=0.0))

@@ -19,7 +19,7 @@ import numpy as np
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.block_least_squares import by_block, gain, log10_chance, series, withheld
 from camcomp.diagnosis.axis.channel_data import TURNING, ChannelData
-from camcomp.diagnosis.axis.channel_fit import ChannelFit, fit_channel, healthy_sizes
+from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel, healthy_sizes
 from camcomp.diagnosis.axis.disturbance_window import Window, find_window, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
 from camcomp.diagnosis.axis.findings import FAR, FIRST_MOVE_MM, ROWS, AxisChannel, AxisFindings, AxisRun
@@ -39,8 +39,6 @@ from camcomp.model.statics.rotation import rotations_of
 TURNS_MM = (1e-4, 0.003, 0.02, 0.1)  # ways over which the friction of a slide turns round in its following error
 TURNS_MM_PER_S = (0.3, 1.5, 5.0)  # speeds with which it may turn round instead
 CREEP = 0.02  # of the fastest row: speed at which Coulomb friction has turned round
-MOST_PUSHES = 2  # of an axis: what comes more often is no mishap
-LEAST_RIPPLE = 0.02  # share of the residual's energy
 LEAST_ARM = 1e-3  # of a direction, or of an arm of 1 m: by which a weight has to change with the pose
 
 
@@ -187,7 +185,7 @@ def study_channel(
     _tell(found, rows, done, data.healthy)
     if rows.channel == "force" and not rows.runs[0].revolute:
         line = ripple([rows.moves[k] for k in rows.train], [done.left[k] for k in rows.train])
-        if line is not None and line.share > LEAST_RIPPLE and line.amplitude**2 / 2.0 > (MINOR * rows.floor) ** 2:
+        if line is not None and line.amplitude**2 / 2.0 > (MINOR * rows.floor) ** 2:
             found.ripple = line
             waves = [wave(2.0 * np.pi * _positions(rows) / line.period) for wave in (np.sin, np.cos)]
             before, after = (
@@ -329,10 +327,10 @@ def _covariates(found: AxisFindings, rows: JointRows, around: AxisSurroundings) 
 def _with_pushes(
     name: str, data: ChannelData, terms: Sequence[AxisCause], done: ChannelFit, rows: JointRows
 ) -> tuple[ChannelFit, list[AxisCause]]:
-    """The same fit beside forces that act for a while, where their windows are clear and the evidence takes them."""
+    """The fit jointly with disturbance forces, as long as the evidence takes one more, and these."""
     pushes: list[AxisCause] = []
-    for _ in range(MOST_PUSHES):
-        beside = {k: np.concatenate([*data.healthy[k].values()], axis=1) for k in rows.train}
+    for _ in range(CAUSES):
+        beside = {k: data.healthy_columns(k) for k in rows.train}
         left = {k: done.left[k] for k in (*rows.train, *rows.test)}
         found = find_window(left, beside, {k: rows.moves[k].time for k in left}, data.floor)
         if found is None:

@@ -30,7 +30,7 @@ from camcomp.diagnosis.axis.terms import AxisTravel, ripple
 from camcomp.diagnosis.law.forms import Form, at_drive
 from camcomp.diagnosis.law.sizes import sizes
 from camcomp.diagnosis.law.words import law_sentence, law_sum
-from camcomp.diagnosis.result.types import Law, LawPart, LawTerm
+from camcomp.diagnosis.result.types import Law, LawPart, LawTerm, six_digits
 from camcomp.ground.datatypes import Floats
 from camcomp.model.law.covariates import REFERENCE_C
 from camcomp.model.law.expression import parse
@@ -219,7 +219,7 @@ def _told(name: str, seen: Sequence[tuple[bool, _Rows]], forms: Sequence[Form], 
         where = f"{'force' if is_force else 'control'} {name}"
         own = "N" if is_force else "mm"
         terms += [
-            LawTerm(term=f"{where}: {t}", value=_round(v), ci95=(_round(v - h), _round(v + h)), unit=f"{own}/{u}" if u else own)
+            LawTerm(term=f"{where}: {t}", value=six_digits(v), ci95=(six_digits(v - h), six_digits(v + h)), unit=f"{own}/{u}" if u else own)
             for t, u, v, h in zip(texts, units, value, half, strict=True)
         ]  # fmt: skip
         formula = law_sum(list(zip([float(v) for v in value], texts, strict=True)))
@@ -227,7 +227,7 @@ def _told(name: str, seen: Sequence[tuple[bool, _Rows]], forms: Sequence[Form], 
         before, after = rows.rms([]), rows.rms(forms)
         changes.append((before, after))
         own_envelope = {
-            key: (_round(float(rows.known[key].min())), _round(float(rows.known[key].max())))
+            key: (six_digits(float(rows.known[key].min())), six_digits(float(rows.known[key].max())))
             for key in parse(formula, dict.fromkeys(rows.known)).names
         }
         envelope |= own_envelope
@@ -247,7 +247,3 @@ def _told(name: str, seen: Sequence[tuple[bool, _Rows]], forms: Sequence[Form], 
         formula="; ".join(formulas), on="drive" if seen[0][0] else "control", terms=tuple(terms), envelope=envelope,
         after_rms_um=round(1e3 * after, 3), before_rms_um=round(1e3 * before, 3), says=says, parts=tuple(parts),
     )  # fmt: skip
-
-
-def _round(value: float) -> float:
-    return float(f"{value:.6g}")

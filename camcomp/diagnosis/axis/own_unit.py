@@ -24,6 +24,5 @@ def in_own_unit(cause: FoundCause, axis: AxisFindings) -> FoundCause:
     out: dict[str, Estimate] = {}
     for name, own in cause.parameters.items():
         other, power = _OF_HINGES.get(name, (name, 0.0))
-        value, low, high = (float(f"{each * lever**power:.6g}") for each in (own.value, *own.ci95))
-        out[other] = Estimate(value=value, ci95=(low, high))
+        out[other] = Estimate.stated(*(each * lever**power for each in (own.value, *own.ci95)))
     return cause.model_copy(update={"parameters": out})

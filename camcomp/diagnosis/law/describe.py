@@ -13,7 +13,7 @@ from camcomp.diagnosis.law.bench_terms import Spot, TermBench
 from camcomp.diagnosis.law.find import FoundLaw, strengths
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.words import law_sentence, law_sum, listed
-from camcomp.diagnosis.result.types import Law, LawPart, LawTerm, Stage
+from camcomp.diagnosis.result.types import Law, LawPart, LawTerm, Stage, six_digits
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.law.expression import parse
 
@@ -64,8 +64,8 @@ def _formula_parts(bench: TermBench, found: FoundLaw, actuators: Sequence[str]) 
             pairs.setdefault(term.spot, []).append((float(value), _tidy(text)))
             terms.append(
                 LawTerm(
-                    term=f"{_where(term.spot, actuators)}: {_tidy(text)}", value=_round(value),
-                    ci95=(_round(value - s), _round(value + s)), unit=_unit(bench, term.spot, unit),
+                    term=f"{_where(term.spot, actuators)}: {_tidy(text)}", value=six_digits(value),
+                    ci95=(six_digits(value - s), six_digits(value + s)), unit=_unit(bench, term.spot, unit),
                 )
             )  # fmt: skip
     parts = []
@@ -84,14 +84,14 @@ def _map_parts(bench: TermBench, found: FoundLaw, actuators: Sequence[str]) -> t
         assert isinstance(term.form, SmoothForm)
         coefficients = np.round(theta.reshape(term.form.counts), 7).tolist()
         limits = zip(term.form.about, term.form.limits, strict=True)
-        envelope = {name: (_round(low), _round(high)) for name, (low, high) in limits}
+        envelope = {name: (six_digits(low), six_digits(high)) for name, (low, high) in limits}
         parts.append(
             LawPart(
                 effect="map", over=term.form.about, coefficients_mm=coefficients, envelope=envelope,
                 **_at(term.spot, actuators),
             )
         )  # fmt: skip
-        low, high = _round(theta.min()), _round(theta.max())
+        low, high = six_digits(theta.min()), six_digits(theta.max())
         terms.append(
             LawTerm(
                 term=f"{_where(term.spot, actuators)}: map over {listed(term.form.about)}", value=max(abs(low), abs(high)),
@@ -113,7 +113,7 @@ def _envelope(bench: TermBench, spot: Spot, names: Iterable[str]) -> dict[str, t
     for name in names:
         low, high = size.limits[name]
         if high > low:
-            out[name] = (_round(low), _round(high))
+            out[name] = (six_digits(low), six_digits(high))
     return out
 
 
@@ -145,10 +145,6 @@ def _unit(bench: TermBench, spot: Spot, per: str) -> str:
     hinge = spot.on in ("control", "drive") and bench.bench.twin.robot.actuators[spot.index].revolute
     own = "rad" if hinge else "mm"
     return f"{own}/{per}" if per else own
-
-
-def _round(value: float) -> float:
-    return float(f"{value:.6g}")
 
 
 def moved_without(bench: TermBench, found: FoundLaw) -> list[Floats]:

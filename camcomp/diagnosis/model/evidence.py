@@ -387,6 +387,7 @@ class Reduced:
         """Log share (s, widths) of the posterior that has the right signs; minus infinity far outside of the bounds."""
         bounds = self.model.bounds
         signed = bounds.sign[on] > 0.0
-        out = np.where(signed, log_ndtr(np.where(signed, mean / sd, 0.0)) + log(2.0), 0.0).sum(axis=2)
+        share = log_ndtr(np.where(signed, mean / np.maximum(sd, 1e-300), 0.0)) + log(2.0)
+        out = np.where(signed, share, 0.0).sum(axis=2)
         outside = (mean < bounds.low[on] - 3.0 * sd) | (mean > bounds.high[on] + 3.0 * sd)
         return np.where(outside.any(axis=2), -np.inf, out)

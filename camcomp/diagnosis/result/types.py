@@ -18,6 +18,11 @@ Pair = Annotated[tuple[float, float], Field(description="low and high end")]
 UNKNOWN: Literal["unknown"] = "unknown"
 
 
+def six_digits(value: float) -> float:
+    """A value as results state it, to six digits."""
+    return float(f"{value:.6g}")
+
+
 class ActuatorGap(Result):
     """Size of an actuator's error (rms) and of its noise, in its own unit."""
 
@@ -150,6 +155,12 @@ class Estimate(Result):
 
     value: float
     ci95: Pair
+
+    @classmethod
+    def stated(cls, value: float, low: float, high: float) -> Estimate:
+        """The estimate to six digits, with an interval that holds the value, whichever end is the low one."""
+        low, value, high = (six_digits(each) for each in (low, value, high))
+        return cls(value=value, ci95=(min(low, value, high), max(low, value, high)))
 
 
 class FoundCause(NamedCause):
