@@ -17,6 +17,7 @@ from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.answer.stretch import with_stretches
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
+from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.gap import floor_um, gap_of, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
@@ -51,7 +52,7 @@ from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies
-from camcomp.diagnosis.statistics.probability import probability_of_chance
+from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.progress import part as part_of_work
 from camcomp.model.effect import Cause
@@ -59,11 +60,7 @@ from camcomp.model.job import Job
 from camcomp.model.motion.twin import Twin
 
 ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
-MOSTLY_ONE_ACTUATOR = 0.6  # share of what is unknown from which on it is one actuator's
-VIBRATION_SHARE = 0.4  # of the gap in one line of the spectrum
 EXCLUDED = 0.02  # probability of a set of causes, below which no experiment need test it
-UNTESTED = 0.1  # of the leader's probability: the least that a set that explains as well counts as
-LEAST_DRIVER = 0.02  # share of what is left, below which nothing is a driver
 MOST_ALTERNATIVES = 4  # sets that are listed (contract, section 6)
 UNLOGGED_RISE = (0.3, 3.0)  # times the 10 K that are taken where no temperature is logged: by how much drives warm up
 RIVALS = 8  # sets that one experiment is asked to tell from the answer
@@ -153,9 +150,8 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
     if len(close) == 1:
         likely = (int(j) for j in np.argsort(-found.probability) if found.probability[j] > EXCLUDED)
         close += [j for j in likely if j != best][:3]
-    p = found.probability[close]
-    if found.verdict.rivals:
-        p = np.maximum(p, UNTESTED * p.max())  # they explain equally well: a low prior does not exclude them
+    # rivals explain equally well: a low prior does not exclude them
+    p = np.ones(len(close)) if found.verdict.rivals else found.probability[close]
     fits = [found.fits[j] for j in close]
     proposal = propose(problem, fits, p / p.sum(), job)
     return None if proposal is None else with_outcomes(proposal, [_set_name(problem, f) for f in fits])
@@ -205,7 +201,7 @@ def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer |
     out.sort(key=lambda c: (-c.probability, -c.share))
     if found.unknown_in:
         shares = rest_by_actuator(problem, best, found.unknown_in)
-        target = next((name for name, share in shares.items() if share > MOSTLY_ONE_ACTUATOR), None)
+        target = next((name for name, share in shares.items() if share > EVEN), None)
         out.append(
             UnknownCause(
                 target=target,
@@ -335,17 +331,14 @@ def _first_label(found: CauseSearch) -> str:
 def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[SpectralLine]) -> list[Driver]:
     """Covariates of the gap; with an unknown cause, covariates of the residual."""
     if found.unknown_in:
-        labels = (*_vibrations(heard), *found.left[found.unknown_in].labels)
+        # a vibration of one frequency depends on time alone
+        lines = tuple((f"time:{line.name}", line.share) for line in heard)
+        labels = tuple(sorted((*lines, *found.left[found.unknown_in].labels), key=lambda each: -each[1]))
     else:
         null = problem.refit(())
         at_null = residual_tests(problem, null, firm_prior(problem))
         labels = max(at_null.values(), key=lambda each: each.energy).labels if at_null else ()
-    return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:6] if share > LEAST_DRIVER]
-
-
-def _vibrations(heard: Sequence[SpectralLine]) -> tuple[tuple[str, float], ...]:
-    """Labels and shares of spectral lines above VIBRATION_SHARE: a vibration of one frequency depends on time alone."""
-    return tuple((f"time:{line.name}", line.share) for line in heard if line.share > VIBRATION_SHARE)
+    return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:6] if share > MINOR**2]
 
 
 # -- shrinkage --------------------------------------------------------------------------------------------------------

@@ -42,8 +42,6 @@ from camcomp.model.statics.build import build_robot
 from camcomp.model.statics.description import Robot
 from camcomp.model.statics.masses import has_moved_mass
 
-MOSTLY = 0.5  # share of rows with a value from which on a channel counts as logged, and rows without it as lost
-
 
 @dataclass(frozen=True, eq=False)
 class LogStudy:
@@ -217,11 +215,11 @@ def _poses(run: RunSpec, log: Measured) -> Poses:
 
 
 def _filled(time: Floats, values: Floats) -> Floats | None:
-    """A logged channel (n,) with its empty cells interpolated in time; None where the share of known cells is at most
-    MOSTLY.
+    """A logged channel (n,) with its empty cells interpolated in time; None where at most half of its cells are
+    known.
     """
     known = np.isfinite(values)
-    if known.mean() <= MOSTLY:
+    if known.mean() <= 0.5:
         return None
     order = np.flatnonzero(known)[np.argsort(time[known], kind="stable")]
     return np.where(known, values, np.interp(time, time[order], values[order]))
@@ -234,7 +232,7 @@ def _axis(run: RunSpec, log: Measured, k: int, revolute: bool, expected: Floats)
     channels = (lever * log.encoder[:, k], lever * log.setpoint[:, k], log.drive[:, k] / lever, lever * log.load[:, k])
     known = np.isfinite(log.encoder[:, k]) & np.isfinite(expected)
     for each in channels:
-        if np.isfinite(each).mean() > MOSTLY:
+        if np.isfinite(each).mean() > 0.5:
             known &= np.isfinite(each)
     rows = np.flatnonzero(known)
     rows = rows[np.unique(log.time[rows], return_index=True)[1]]

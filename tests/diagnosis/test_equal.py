@@ -8,7 +8,10 @@ import pytest
 
 from camcomp.api.diagnosis import diagnose
 from camcomp.diagnosis.next_experiment.designed import propose
-from camcomp.diagnosis.search.indistinguishable import classes, likeness, stand_ins
+from camcomp.diagnosis.search.cause_search import SAME_EVIDENCE
+from camcomp.diagnosis.search.indistinguishable import classes, likeness
+from camcomp.diagnosis.statistics.cause_sets import total
+from camcomp.diagnosis.statistics.evidence import gram, misfit
 from tests.diagnosis.conftest import plan_of
 from tests.validation.orthoglide.cases import EQUAL
 from tests.validation.plants.further_run import add_run
@@ -80,14 +83,22 @@ def test_an_encoder_tells_a_lag_from_a_late_clock_before_anything_is_measured(wo
     assert not any(("servo_lag", None) in group for group in there)
 
 
-def test_a_member_in_its_own_direction_is_what_counts(workshop):
+def test_rows_of_a_member_in_its_own_direction_are_what_another_one_has_to_fit(workshop):
     """A workpiece that is turned and shifted in its plane is no long tool; one that is lifted is."""
     problem = workshop.answer(LONG)[1].problem
-    design, candidates = likeness(problem), problem.columns.candidates
-    frame = next(i for i, a in enumerate(candidates) if a.name == "workpiece_frame")
-    tool = next(i for i, a in enumerate(candidates) if a.name == "tool_length")
-    assert (tool,) in stand_ins(design, (frame,), np.array([0.0, 0.0, 1.0, 0.0]))
-    assert (tool,) not in stand_ins(design, (frame,), np.array([1.0, 0.5, 0.0, 0.3]))
+    frame, tool = (
+        problem.member_columns((i,))
+        for name in ("workpiece_frame", "tool_length")
+        for i, a in enumerate(problem.columns.candidates)
+        if a.name == name
+    )
+
+    def behind(theta):
+        data = total([gram(W, W[:, frame] @ theta) for W in problem.white])
+        return 0.5 * (misfit(data, problem.prior, tool) - misfit(data, problem.prior, frame))
+
+    assert behind(np.array([0.0, 0.0, 1.0, 0.0])) < SAME_EVIDENCE
+    assert behind(np.array([1.0, 0.5, 0.0, 0.3])) > SAME_EVIDENCE
 
 
 @pytest.mark.campaign

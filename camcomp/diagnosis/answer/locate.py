@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import thinned
-from camcomp.diagnosis.fit.columns import RUN_OFFSET_MM
+from camcomp.diagnosis.fit.floor import REPEATABILITY_MM
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics import places
@@ -37,7 +37,7 @@ def run_gaps(problem: Problem, causes: Sequence[Cause] = ()) -> list[places.RunG
         tip, position, direction = (
             thinned(v, run.thin) for v in (problem.bench.nominal[k].tip, motion.encoder, motion.direction)
         )
-        noise = np.where(np.isfinite(noise), np.hypot(noise, RUN_OFFSET_MM if part.start == 0 else 0.0), 1.0)
+        noise = np.where(np.isfinite(noise), np.hypot(noise, REPEATABILITY_MM if part.start == 0 else 0.0), 1.0)
         out.append(
             places.RunGap(
                 name=run.name,

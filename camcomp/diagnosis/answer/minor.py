@@ -6,25 +6,25 @@ from __future__ import annotations
 
 import numpy as np
 
+from camcomp.diagnosis.fit.floor import HEALTHY
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.result.types import MinorEffect, Outlier
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
 
-LEAST = 0.05  # of the noise floor: smaller ones are not worth a line
 MOST_LISTED = 8
 
 
 def minor_effects(problem: Problem, f: Fitted) -> tuple[MinorEffect, ...]:
     """Effects of a fit with shrinkage that are no causes, largest first."""
-    mean, _ = estimate(total(f.grams), problem.prior, problem.member_columns(f.members), f.factor)
+    mean, _ = estimate(total(f.grams), problem.prior, problem.member_columns(f.members))
     found = []
     for i, (candidate, columns) in enumerate(zip(problem.columns.candidates, problem.candidates.columns, strict=True)):
         if i in f.members or not columns:
             continue
         index = list(columns)
         size = problem.size_um(index, mean[index])
-        if size > LEAST * problem.floor.tip_um:
+        if size > HEALTHY * problem.floor.tip_um:
             found.append(MinorEffect(effect=candidate.name, target=candidate.target, size_um=round(size, 3)))
     return tuple(sorted(found, key=lambda each: -each.size_um)[:MOST_LISTED])
 

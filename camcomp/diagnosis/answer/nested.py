@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.search.tempering import tempering
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, parts_of, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, parts_of, temperature_of, total
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 
@@ -26,7 +25,7 @@ def causes_without(
         return [_by_candidate(problem, best, best.members, best.theta)] * len(runs)
     rivals = [fits[j] for j in np.argsort(-probability) if _is_rival(fits[j].members, best.members)][:RIVALS]
     tried = [(best, part) for part in parts_of(best.members)] + [(f, f.members) for f in rivals]
-    temperature = tempering(problem, best)
+    temperature = temperature_of(best, problem.prior, problem.member_columns(best.members))
 
     def value(k: int, f: Fitted, members: Members) -> float:
         scale = Scale(total(f.grams) - f.grams[k], problem.prior, problem.candidates)

@@ -15,8 +15,6 @@ from camcomp.ground.datatypes import Floats
 
 _BINS = 40
 _FEWEST = 3  # rows of a bin that is looked at
-_WIDEST = 0.5  # of the travel: what is wider is no stretch of it
-_MOSTLY = 0.5  # share of the gap that goes with a position, from which on its stretch is looked for
 
 
 def with_stretches(drivers: Sequence[Driver], problem: Problem, f: Fitted) -> list[Driver]:
@@ -50,7 +48,7 @@ def with_stretches(drivers: Sequence[Driver], problem: Problem, f: Fitted) -> li
 
 
 def _asked(driver: Driver) -> bool:
-    return driver.covariate.startswith("position:") and driver.share > _MOSTLY
+    return driver.covariate.startswith("position:") and driver.share > 0.5
 
 
 def stretch(position: Floats, gap: Floats) -> tuple[float, float] | None:
@@ -71,6 +69,6 @@ def stretch(position: Floats, gap: Floats) -> tuple[float, float] | None:
         return None
     off = np.where(seen, np.abs(mean - np.median(mean[seen])), 0.0)
     high = np.flatnonzero(off > 0.5 * off.max())
-    if not len(high) or high[-1] - high[0] + 1 > _WIDEST * _BINS or (np.diff(high) > 2).any():
+    if not len(high) or high[-1] - high[0] + 1 > 0.5 * _BINS or (np.diff(high) > 2).any():
         return None
     return float(edges[high[0]]), float(edges[high[-1] + 1])

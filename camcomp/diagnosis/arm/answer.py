@@ -24,7 +24,7 @@ from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.folds import without_nuisances
 from camcomp.diagnosis.model.group import split_regions
-from camcomp.diagnosis.model.verdict import EVEN, VerdictInputs, decide
+from camcomp.diagnosis.model.verdict import VerdictInputs, decide
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
     CurveCause,
@@ -43,6 +43,7 @@ from camcomp.diagnosis.result.types import (
     Where,
     six_digits,
 )
+from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Floats
 
 MINOR = 0.3  # of the floor: an effect that moves the tip less is no cause

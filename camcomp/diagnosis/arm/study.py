@@ -24,9 +24,9 @@ from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrink
 from camcomp.diagnosis.model.discrepancy import residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.explain import Explanation, KnownNoise, explain
-from camcomp.diagnosis.model.verdict import EVEN
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
+from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground import progress
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause

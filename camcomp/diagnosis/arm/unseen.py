@@ -20,7 +20,7 @@ from camcomp.diagnosis.model.folds import Excess, HeldOut, excess_of, folds_of, 
 from camcomp.diagnosis.model.group import split_regions
 from camcomp.diagnosis.model.search import MOST, search_sets
 from camcomp.diagnosis.result.types import FoundCause, ShrinkageStep, UnknownCause, UnseenShrinkage
-from camcomp.diagnosis.statistics.one_more import log_ratio, of_one_more, scatter
+from camcomp.diagnosis.statistics.shrinkage import log_ratio, of_one_more, scatter
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause

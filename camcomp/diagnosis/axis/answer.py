@@ -24,8 +24,8 @@ from camcomp.diagnosis.result.types import (
     UnseenShrinkage,
     Where,
 )
-from camcomp.diagnosis.statistics.one_more import log_ratio, of_one_more, scatter
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
+from camcomp.diagnosis.statistics.shrinkage import log_ratio, of_one_more, scatter
 from camcomp.ground.datatypes import Floats
 from camcomp.model.motion.log_columns import log_columns
 

@@ -20,6 +20,7 @@ from camcomp.diagnosis.experiment.log_checks import (
 )
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
+from camcomp.diagnosis.fit.starts import BEGUN_ANEW
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, shelf
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
@@ -33,7 +34,6 @@ from camcomp.model.motion.twin import Twin
 from camcomp.model.trajectory.segments import merged
 
 SAMPLE_MM = 2.0  # distance of points of the program for comparisons
-GAP_ROWS = 3.0  # times the median step: longer gaps are not interpolated
 GUESSED_MM, GUESSED_RAD = (
     1e-3,
     1e-6,
@@ -44,7 +44,6 @@ MOST_PASSES = 8  # of the alignment with a deflected tip
 SETTLED_MM = 1e-3  # rms change of the deflection at which the passes end
 SOON_S = 1e-4  # time step of the tip's direction
 STANDING_MM_PER_S = 0.05
-_UPRIGHT = 0.9  # cosine of the path to z beyond which x defines its lateral directions
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -337,7 +336,7 @@ def _guessed(time: Floats, values: Floats, most: float) -> Bools:
     here, before, after = k - 1, np.maximum(k - 2, 0), np.minimum(k, len(speed) - 1)
     turns = np.maximum(np.abs(speed[here] - speed[before]), np.abs(speed[after] - speed[here]))
     aside = turns * np.minimum(time[out] - at[k - 1], at[k] - time[out])
-    near = (at[k] - at[k - 1] < GAP_ROWS * usual) & (time[out] >= at[0]) & (time[out] <= at[-1])
+    near = (at[k] - at[k - 1] < BEGUN_ANEW * usual) & (time[out] >= at[0]) & (time[out] <= at[-1])
     out[out] = ~near | (aside > most)
     return out
 
@@ -455,7 +454,7 @@ def _across(path: Path, aligned: Aligned, velocity: Floats) -> Floats:
     along = path_geometry.tangents(path, aligned.motion, aligned.share)
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
     along = np.where(speed > STANDING_MM_PER_S, velocity / np.maximum(speed, 1e-12), along)
-    other = np.where(np.abs(along[:, 2:3]) < _UPRIGHT, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    other = np.where(along[:, 2:3] ** 2 < 0.5, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     side = np.cross(along, other)
     side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
     return np.stack([along, side, np.cross(along, side)], axis=1)

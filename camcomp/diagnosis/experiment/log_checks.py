@@ -7,6 +7,7 @@ from itertools import permutations
 import numpy as np
 from scipy.spatial import KDTree
 
+from camcomp.diagnosis.fit.floor import LEAST_ROWS
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
 from camcomp.ground.datatypes import Bools, Floats, Ints
@@ -16,8 +17,6 @@ from camcomp.model.statics.arm import ARM_LENGTH
 FAR_RAD = 0.1  # FAR_MM of a hinge: error of a log of another program or unit
 PLACE = 0.01  # of FAR_MM or FAR_RAD: rows within it are one position
 ASIDE_MM = 1.0  # median distance from the path above that of any controller
-LEAST_AGREEMENT = 0.7  # share of the moving rows in the direction of the program
-LEAST_ROWS = 10  # of a run with a program, for an estimate of its noise
 _LENGTH_UNITS = {1e-3: "m", 25.4: "mm where inches are due", 1.0 / 25.4: "inches", 1e3: "um"}
 _TURNS = {180.0 / np.pi: "degrees"}
 _TIMES = {1e3: "ms", 1e6: "us", 1.0 / 60.0: "minutes"}
@@ -28,7 +27,6 @@ SAME_FORCE = (0.1, 10.0)  # ratio of measured to modelled force after the change
 AXES = ("x", "y", "z")
 ROWS_APART = (1, -1, 2, -2, 3, -3)  # between channels of one log
 LATEST_S = 0.05  # largest clock offset and largest lateness of a drive
-TOGETHER = 0.35  # of the distance: largest residual after a shift by rows that is accepted as the cause
 _HOT_C = 150.0
 _STRONG_N = 20.0
 
@@ -131,9 +129,9 @@ def _is_scaled(found: Floats, due: Floats, factor: float, strong: float) -> bool
 
 
 def check_followed(name: str, run: str, distance: Floats, agreement: float, aside_mm: float = ASIDE_MM) -> None:
-    """Raise CC406 for a motion off the program: distance (n,) mm from it; agreement: share of rows in its direction."""
+    """Raise CC406 for a motion off the program: distance (n,) mm from it; agreement: share of rows in its direction, most are."""
     off = float(np.median(distance))
-    if off > aside_mm or agreement < LEAST_AGREEMENT:
+    if off > aside_mm or agreement < 0.5:
         way = f"{off:.3g} mm beside the program" if off > aside_mm else "against the way of the program"
         raise ConfigError("CC406", f"run '{run}': the motion runs {way}", at=Location(name, 1, 1))
 
@@ -168,7 +166,7 @@ def check_rows_together(
 
     here = off(0)
     for by in ROWS_APART:
-        if abs(by) * usual > LATEST_S and off(by) < TOGETHER * here:
+        if abs(by) * usual > LATEST_S and off(by) < 0.5 * here:
             way = "behind" if by < 0 else "ahead of"
             message = f"run '{run}': the {what} {abs(by)} row{'s' if abs(by) > 1 else ''} {way} {other}"
             raise ConfigError("CC412", message, at=Location(name, 1, 1))

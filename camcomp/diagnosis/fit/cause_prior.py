@@ -3,7 +3,7 @@
 import numpy as np
 
 from camcomp.diagnosis.fit.columns import Columns
-from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE
+from camcomp.diagnosis.fit.intervals_in_time import log_intervals
 from camcomp.diagnosis.statistics.cause_sets import CausePrior
 
 
@@ -18,7 +18,7 @@ def cause_prior(columns: Columns) -> CausePrior:
         share = (
             1.0 / len(same) if not common or len(same) == 1 else (0.5 if a.target is None else 0.5 / (len(same) - 1))
         )
-        sought = LOOK_ELSEWHERE if any(p.placed for p in a.shapes) else 0.0
+        sought = log_intervals(len(columns.blocks)) if any(p.placed for p in a.shapes) else 0.0
         weight.append(np.log(share / len(names)) - sought)
 
     def exclusive(i: int, j: int) -> bool:

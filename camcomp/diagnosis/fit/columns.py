@@ -7,15 +7,15 @@ tolerance what every healthy machine has of it.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
+from camcomp.diagnosis.fit.floor import HEALTHY, REPEATABILITY_MM
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
-from camcomp.diagnosis.fit.starts import start_columns
+from camcomp.diagnosis.fit.starts import Nuisance, start_columns
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground import shelf
@@ -26,12 +26,10 @@ from camcomp.model.axes import slides_of
 from camcomp.model.effect import Cause, Load, Parameter, applies
 from camcomp.model.statics.description import Link, Parallelogram, Robot
 
-RUN_OFFSET_MM = 0.001  # repeatability of a run
 RUN_OFFSET_N, RUN_OFFSET_NMM = 0.3, 300.0
 CLOCK_JITTER_S = 1e-5
 CLOCK_RATE = 1e-5
 SPRING_LOG = 0.01  # one link's spring against its stated value
-HEALTHY = 0.08  # of the noise floor at the tip: what of every effect is within tolerance
 MOST_HEALTHY = 0.3  # of an effect's typical size
 # tolerances beyond which it is no tolerance: at the tip no longer minor, by chance once in 5600
 _EDIT = 0.05  # step of the allowances' differences
@@ -115,8 +113,8 @@ class Columns:
     @cached_property
     def run_offsets(self) -> Ints:
         """Columns by which the measured tip of one run may differ from that of the next."""
-        firm = (self.prior.flexible == 0) & np.isfinite(self.prior.tolerance)
-        return np.flatnonzero(firm & np.array([n.startswith("offset.") for n in self.names], bool))
+        tips = tuple(f".{name}" for name in channel_names(())[:3])
+        return np.flatnonzero(np.array([n.startswith("offset.") and n.endswith(tips) for n in self.names], bool))
 
 
 def candidate_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, float]) -> list[list[Floats]]:
@@ -160,18 +158,14 @@ def build(
     tolerance: list[float] = []
     reach: list[float] = []
     sign: list[float] = []
-    flexible: list[float] = []
     parts: list[list[Floats]] = []
 
-    def put(
-        who: int, name: str, size: float, most: float, per_run: list[Floats], *, signed: int = 0, loose: bool = False
-    ) -> None:
+    def put(who: int, name: str, size: float, most: float, per_run: list[Floats], *, signed: int = 0) -> None:
         owner.append(who)
         names.append(name)
         tolerance.append(size)
         reach.append(most)
         sign.append(float(signed))
-        flexible.append(float(loose))
         parts.append(per_run)
 
     for i, candidate in enumerate(steps(candidates, len(candidates))):
@@ -183,11 +177,11 @@ def build(
             size, most = healthy_sizes(
                 bench=bench, candidate=candidate, p=p, per_run=per_run, floor_um=floor_um, minor_um=minor_um
             )
-            put(i, f"{candidate.label}.{p.name}", size, most, per_run, signed=p.sign, loose=True)
-    for name, size, per_run, loose in _nuisances(bench):
+            put(i, f"{candidate.label}.{p.name}", size, most, per_run, signed=p.sign)
+    for name, size, per_run in _nuisances(bench):
         if name.startswith("spring."):  # a soft machine has no more of it than of anything else
             size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
-        put(-1, name, size, minor_um / (HEALTHY * floor_um) * size, per_run, loose=loose)
+        put(-1, name, size, minor_um / (HEALTHY * floor_um) * size, per_run)
     channels = range(6 + 2 * len(bench.actuators))
     blocks = tuple(
         ByChannel.of(np.stack([each[r][:, c] for each in parts], axis=1) for c in channels)
@@ -195,7 +189,7 @@ def build(
     )
     bench.columns.clear()  # they stand in the blocks now
     k = len(owner)
-    prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(flexible), np.array(reach))
+    prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(reach))
     return Columns(tuple(candidates), np.array(owner), tuple(names), prior, blocks)
 
 
@@ -237,9 +231,9 @@ def moved_tip(bench: Bench, k: int, changes: Floats, rows: slice = slice(None)) 
     return moved
 
 
-def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
-    """Name, narrow size in units of the column, column per run, whether its size may be off."""
-    found: list[tuple[str, float, list[Floats], bool]] = []
+def _nuisances(bench: Bench) -> list[Nuisance]:
+    """Name, narrow size in units of the column, and column per run."""
+    found: list[Nuisance] = []
     zero = [thinned(np.zeros_like(bench.observed(k)), run.thin) for k, run in enumerate(bench.runs)]
 
     def only(r: int, values: Floats) -> list[Floats]:
@@ -252,8 +246,10 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
                 continue
             one = zero[r].copy()
             one[:, c] = 1.0
-            size = RUN_OFFSET_MM if c < 3 else RUN_OFFSET_NMM if c < 3 + 2 * m and hinges[c - 3 - m] else RUN_OFFSET_N
-            found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one), c >= 3))
+            size = (
+                REPEATABILITY_MM if c < 3 else RUN_OFFSET_NMM if c < 3 + 2 * m and hinges[c - 3 - m] else RUN_OFFSET_N
+            )
+            found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one)))
     found += start_columns(bench, lambda r, values: only(r, thinned(values, bench.runs[r].thin)))
     clock = CandidateCause("time_sync", None, shelf.load("effects", "time_sync"))
     frame = CandidateCause("workpiece_frame", None, shelf.load("effects", "workpiece_frame"))
@@ -263,8 +259,8 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
         for r, run in enumerate(bench.runs):
             second = ticks[r] / scale
             time = thinned(run.run_path.time[:, None], run.thin)
-            found.append((f"clock.{run.name}", CLOCK_JITTER_S, only(r, second), True))
-            found.append((f"rate.{run.name}", CLOCK_RATE, only(r, second * time), True))
+            found.append((f"clock.{run.name}", CLOCK_JITTER_S, only(r, second)))
+            found.append((f"rate.{run.name}", CLOCK_RATE, only(r, second * time)))
         _by_label(found, bench, "clock", [(clock.parameters[0].name, ticks)])
         frames = candidate_columns(bench, frame, {})
         _by_label(found, bench, "clamping", [(p.name, f) for p, f in zip(frame.parameters, frames, strict=True)])
@@ -272,20 +268,20 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
     return found
 
 
-def _by_label(found: list[Any], bench: Bench, label: str, columns: Sequence[tuple[str, list[Floats]]]) -> None:
+def _by_label(found: list[Nuisance], bench: Bench, label: str, columns: Sequence[tuple[str, list[Floats]]]) -> None:
     """Free columns for every label that differs from others: only differences between labels are nuisances."""
     labels = [getattr(run, label) for run in bench.runs]
     for other in apart(labels):
         for name, per_run in columns:
             masked = [f if mine == other else 0.0 * f for mine, f in zip(labels, per_run, strict=True)]
-            found.append((label_name(label, other, name), np.inf, masked, False))
+            found.append((label_name(label, other, name), np.inf, masked))
 
 
-def _allowances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
+def _allowances(bench: Bench) -> list[Nuisance]:
     """Nuisances that allow for the usual errors of any model: springs of single chains, direction of the cutting
     force.
     """
-    found: list[tuple[str, float, list[Floats], bool]] = []
+    found: list[Nuisance] = []
     edits: list[tuple[str, Callable[[Robot], Robot]]] = []
     for chain in bench.twin.robot.chains:
         if any(isinstance(e, Link) for e in chain.elements):
@@ -294,11 +290,9 @@ def _allowances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
             edits.append((f"bars.{chain.name}", partial(_stiffer_bars, chain=chain.name)))
     if len(edits) <= 12:
         for label, edit in edits:
-            found.append(
-                (f"spring.{label}", SPRING_LOG, _difference(bench, f"spring.{label}", _Edit(edit), _EDIT), True)
-            )
+            found.append((f"spring.{label}", SPRING_LOG, _difference(bench, f"spring.{label}", _Edit(edit), _EDIT)))
     if any(np.abs(run.run_path.node_force).max(initial=0.0) > 0 for run in bench.runs):
-        found.append(("force.direction", FORCE_TURN_RAD, _difference(bench, "force.direction", _Turn(), _EDIT), True))
+        found.append(("force.direction", FORCE_TURN_RAD, _difference(bench, "force.direction", _Turn(), _EDIT)))
     return found
 
 

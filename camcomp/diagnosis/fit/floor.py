@@ -12,15 +12,16 @@ from typing import Literal
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
-from camcomp.diagnosis.statistics.noise_model import REGULAR
+from camcomp.diagnosis.model.noise import resolution_of, rounding_noise
 from camcomp.ground.datatypes import Bools, Floats
+from camcomp.model.seams import missing_rows
 
+LEAST_ROWS = 10  # of a run with a program, for an estimate of its noise
+HEAVY = 3.5  # robust deviations beyond which a reading counts less
 REPEATABILITY_MM = 0.001  # of a run, per axis, where nothing is stated (contract, section 5)
 GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effect that the library lacks
 MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause, whatever its significance (contract, section 6)
-LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
-CLIPPED = 6.0  # robust deviations beyond which a difference of rows is no noise
-LEAST_ROWS = 20
+HEALTHY = 0.08  # of the noise floor at the tip: what of every effect is within tolerance
 STRETCH, LEAST_STRETCHES = 16, 8  # differences of rows that make a stretch, and stretches that tell a quiet one
 LOWER_QUARTILE = 0.82  # of the scatter of such stretches of white noise, in units of the noise (4000 draws: 0.816)
 UNSTEADY = 1.5  # times the quiet stretches: of 4000 draws of 160 rows of white noise none had it
@@ -107,19 +108,16 @@ def _bends(values: Floats, time: Floats) -> Floats | None:
     known = np.flatnonzero(np.isfinite(values))
     if len(known) < LEAST_ROWS:
         return None
-    x, t = values[known], time[known]
-    step = np.diff(t)
-    usual = float(np.median(step))
-    near = step < REGULAR * usual
+    x, near = values[known], ~missing_rows(time[known])
     bend = (x[2:] - 2.0 * x[1:-1] + x[:-2])[near[1:] & near[:-1]] / np.sqrt(6.0)
-    if len(bend) < LEAST_ROWS // 2:
+    if not len(bend):
         return None
     middle = 1.4826 * float(np.median(np.abs(bend)))
-    return np.asarray(bend if middle == 0.0 else np.clip(bend, -CLIPPED * middle, CLIPPED * middle))
+    return np.asarray(bend if middle == 0.0 else np.clip(bend, -HEAVY * middle, HEAVY * middle))
 
 
 def least_noise(bench: Bench, floor: NoiseFloor) -> Floats:
-    """Least standard deviation (c,) of every channel: what moves the tip by LEAST_SHARE of the floor, or one digit.
+    """Least standard deviation (c,) of every channel: what moves the tip by HEALTHY of the floor, or one digit.
 
     The resolution of a channel is noise, and no finding, however sharp.
     """
@@ -130,26 +128,10 @@ def least_noise(bench: Bench, floor: NoiseFloor) -> Floats:
         slopes = bench.slopes[k].at(run.run_path.row_place)
         way = np.maximum(way, np.sqrt(np.mean(np.sum(slopes.tip_rho**2, axis=1), axis=0)))
         push = max(push, float(np.sqrt(np.mean(np.sum(slopes.tip_wrench[:, :, :3] ** 2, axis=(1, 2))))))
-    axis = LEAST_SHARE * floor.axis_mm
+    axis = HEALTHY * floor.axis_mm
     carriage = axis / np.maximum(way, 1e-9)
     springs = np.array([np.inf if a.stiffness is None else a.stiffness for a in bench.twin.robot.actuators])
     drive = carriage * np.where(np.isfinite(springs), springs, 1e4)
     out = np.concatenate([np.full(3, 0.2 * floor.axis_mm), carriage, drive, np.full(3, axis / max(push, 1e-12))])
-    digit = np.zeros_like(out)
-    for k in range(len(bench.runs)):
-        digit = np.maximum(digit, _digits(bench.observed(k)))
-    return np.asarray(np.hypot(out, digit / np.sqrt(12.0)))
-
-
-def _digits(values: Floats) -> Floats:
-    """Step (c,) between the values that a channel takes: a hundredth of the rows apart at least, 0 where none is plain."""
-    out = np.zeros(values.shape[1])
-    for c, x in enumerate(values.T):
-        each = np.unique(x[np.isfinite(x)])
-        if len(each) < 3:
-            continue
-        steps = np.diff(each)
-        step = float(np.min(steps[steps > 1e-9], initial=np.inf))
-        if np.isfinite(step) and np.allclose(steps / step, np.round(steps / step), atol=0.05):
-            out[c] = step
-    return out
+    steps = np.max([[resolution_of(x) for x in bench.observed(k).T] for k in range(len(bench.runs))], axis=0)
+    return np.asarray(np.hypot(out, [rounding_noise(each) for each in steps]))

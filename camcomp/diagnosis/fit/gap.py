@@ -43,7 +43,7 @@ def _label_causes(problem: Problem, f: Fitted) -> list[list[Cause]]:
     found: list[list[Cause]] = [[] for _ in problem.bench.runs]
     if not len(problem.columns.of_labels):
         return found
-    usual = estimate(total(f.grams), problem.prior, problem.member_columns(f.members), f.factor)[0]
+    usual = estimate(total(f.grams), problem.prior, problem.member_columns(f.members))[0]
     amplitude = dict(zip(problem.columns.names, usual, strict=True))
     for label, effect in EFFECT_OF.items():
         candidate = CandidateCause(effect, None, shelf.load("effects", effect))

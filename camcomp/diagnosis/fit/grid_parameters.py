@@ -48,7 +48,7 @@ def reduced_residual(
 ) -> ReducedResidual:
     """Residual per run after a ridge fit of the columns `others`."""
     data = total(grams)
-    precision = np.where(columns.candidate >= 0, 1.0 / 9.0, columns.prior.precision(1.0))[others]
+    precision = np.where(columns.candidate >= 0, 1.0 / 9.0, columns.prior.precision)[others]
     M = data.A[np.ix_(others, others)] + np.diag(precision)
     size = 1.0 / np.sqrt(np.diag(M))
     L = np.linalg.cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(size)))

@@ -29,7 +29,7 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
     # a shape that the data do not tell is known to about a third
     reach = np.array([0.3 * f.extra[i][p.name] for i, p in names])
     G = [W.appended(D * reach) for W, D in zip(problem.white_at(f), shapes, strict=True)]
-    usual, most = _stated(problem, problem.prior.precision(f.factor), problem.prior.reach.copy())
+    usual, most = _stated(problem, problem.prior.precision, problem.prior.reach.copy())
     precision = np.concatenate([usual, np.ones(s)])
     precision[index] = 1e-2 / problem.prior.scale[index] ** 2
     M = sum((g.T @ g for g in G), np.diag(precision))

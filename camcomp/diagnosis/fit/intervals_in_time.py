@@ -6,6 +6,7 @@ not far beyond what chance makes of so many are none.
 
 from collections.abc import Callable, Sequence
 from itertools import combinations
+from math import comb
 
 import numpy as np
 
@@ -14,13 +15,15 @@ from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats
 
 LEAST_GAIN = 60.0  # chi-square of one interval; the best of 1e5 by chance is 20
-LOOK_ELSEWHERE = (
-    10.0  # log of how many intervals there are to choose from, against a cause that has to be sought in time
-)
 LONGEST = 0.5  # of a run: what acts for longer is no disturbance
 LEAST_ROWS = 5
 _BLOCKS = 60
 _JUMPS = 5  # of a leftover, between which an interval is tried
+
+
+def log_intervals(runs: int) -> float:
+    """Logarithm of the number of intervals of so many runs to choose from, against a cause that has to be sought in time."""
+    return float(np.log(runs * comb(_BLOCKS, 2)))
 
 
 def never_ending(candidate: CandidateCause) -> dict[str, float]:

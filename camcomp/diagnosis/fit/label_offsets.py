@@ -16,7 +16,6 @@ from camcomp.model.motion.twin import Twin
 SETTLED_S = 1e-5  # change of a clock that needs no further pass
 PASSES = 5
 STEP_S = 1e-4  # in which a tip moves in one direction
-MOVING_MM_PER_S = 1.0  # a slower row does not determine clocks
 
 
 def with_clocks(twin: Twin, runs: Sequence[Run]) -> list[Run]:
@@ -52,7 +51,7 @@ def _offset(twin: Twin, runs: Sequence[Run]) -> float:
             velocity = (later - now) / (2.0 * STEP_S)
             v = np.linalg.norm(velocity, axis=1)
             ahead = np.sum((run.measured.tip - 0.5 * (now + later)) * velocity, axis=1)
-            use = np.isfinite(ahead) & (v > MOVING_MM_PER_S)
+            use = np.isfinite(ahead) & (v > 0.0)
             late.append(-ahead[use] / v[use] ** 2)
             speed.append(v[use])
         change = _middle(np.concatenate(late), np.concatenate(speed))

@@ -14,11 +14,10 @@ from camcomp.diagnosis.fit.bench import Bench, CandidateCause
 from camcomp.diagnosis.fit.columns import candidate_columns, shape_default
 from camcomp.diagnosis.fit.grid_parameters import quick_columns
 from camcomp.diagnosis.fit.intervals_in_time import never_ending
+from camcomp.diagnosis.model.classes import INDISTINGUISHABLE, LARGE
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 
-MIN_OWN_SHARE = 0.3  # share of its own size that a candidate has to keep beside another one and the workpiece's frame
-LEVEL = 0.1  # share of its own size that has to lie within runs: as much as a row's noise where it is ten times that
 _FRAME = "workpiece_frame"
 
 
@@ -76,7 +75,7 @@ def _a_shift_per_run(bench: Bench, candidate: CandidateCause) -> bool:
         tips = [run[:, :3][np.isfinite(run[:, :3]).all(axis=1)] for run in column]
         whole = sum(float(np.sum(each**2)) for each in tips)
         within = sum(float(np.sum((each - each.mean(axis=0)) ** 2)) for each in tips if len(each))
-        if whole > 0.0 and within > LEVEL**2 * whole:
+        if whole > 0.0 and within > whole / LARGE**2:
             return False
     return True
 
@@ -95,8 +94,8 @@ def _tips(bench: Bench, candidates: Sequence[CandidateCause]) -> Floats:
 
 
 def _alike(own: Floats, others: Floats) -> bool:
-    """Whether `others` (n, k) explain some direction of `own` (n, d) to within MIN_OWN_SHARE of its size."""
+    """Whether `others` (n, k) leave no three deviations of some direction of `own` (n, d) that is LARGE of them."""
     size = np.linalg.norm(others, axis=0)
     basis = np.linalg.qr(others[:, size > 0.0] / size[size > 0.0])[0]
     rest = own - basis @ (basis.T @ own)
-    return bool((np.linalg.norm(rest, axis=0) < MIN_OWN_SHARE * np.linalg.norm(own, axis=0)).any())
+    return bool((LARGE**2 * np.sum(rest**2, axis=0) < INDISTINGUISHABLE * np.sum(own**2, axis=0)).any())

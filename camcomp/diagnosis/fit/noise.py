@@ -5,16 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
-from camcomp.diagnosis.fit.floor import NoiseFloor, row_scatter
+from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, row_scatter
 from camcomp.diagnosis.fit.starts import unknown_starts
+from camcomp.diagnosis.model.noise import rounding_noise
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
 
 TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
-BETWEEN_ROWS = 0.25  # of what the acceleration changes from row to row: how far a speed between them may be off
 UNSTEADY_S = 0.002  # more jitter than any log has
 MIDDLE = 0.4549  # median of a squared standard normal number
-PLAIN = 0.3  # share of the noise at rest by which jitter has to add to it at speed
 REMEMBERED_S = 1.0  # for which slow noise lasts
 
 
@@ -69,7 +68,7 @@ def inflation(bench: Bench) -> list[Floats]:
             m = len(bench.actuators)
             of_drives = TIMING_S**2 * change + unseen_speeds[k]
             # a tip read between the rows may lie at a speed that the rows lack
-            unseen = run.run_path.between_s * float(np.median(np.diff(t))) * BETWEEN_ROWS
+            unseen = run.run_path.between_s * rounding_noise(float(np.median(np.diff(t))))
             extra[:, :3] = np.einsum("nij,nj->ni", slope, of_drives + unseen * change)
             extra[:, 3 : 3 + m] = of_drives
             if unsteady > 0.0:
@@ -95,7 +94,7 @@ def _unseen_speeds(bench: Bench) -> list[Floats]:
         t = run.run_path.time
         known = run.run_path.ordered and len(t) > 4 and late.any()
         usual = float(np.median(np.diff(t))) if known else 0.0
-        out.append(late * usual * BETWEEN_ROWS * _changes(run) if known else np.zeros((len(t), len(late))))
+        out.append(late * rounding_noise(usual) * _changes(run) if known else np.zeros((len(t), len(late))))
     return out
 
 
@@ -180,7 +179,7 @@ def jitter(bench: Bench) -> float:
     order = np.argsort(gain)  # the axes that would see it best have the most to say
     at = np.searchsorted(np.cumsum(reach[order] ** 2), 0.5 * np.sum(reach**2))
     variance = min(float(gain[order][at]), UNSTEADY_S**2)
-    return float(np.sqrt(variance)) if variance * MIDDLE * float(reach.max()) > PLAIN else 0.0
+    return float(np.sqrt(variance)) if variance * MIDDLE * float(reach.max()) > MINOR else 0.0
 
 
 def _speed(bench: Bench, k: int) -> Floats:

@@ -10,7 +10,8 @@ from scipy.ndimage import median_filter
 from scipy.stats import norm
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
-from camcomp.diagnosis.fit.floor import LEAST_ROWS
+from camcomp.diagnosis.fit.floor import HEAVY, LEAST_ROWS
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Bools, Floats
 
 OFF = 8.0  # robust deviations from the rows beside it by which a single row is off
@@ -18,9 +19,6 @@ SHORT, LONG = 7, 61  # rows of the running medians
 GROSS = 160.0  # robust deviations from the rows around it by which several rows in a row are off
 MANY = 0.02  # of the rows: more are no outliers
 FAR_MM = 5.0  # no machine is wrong by so much from one row to the next
-MANY_FAR = 0.25  # of the rows that are as far off: more are no outliers
-SEEN = 12.0  # twice the logarithm of the odds from which on the tip has gone where an encoder says
-HEAVY = 3.5  # robust deviations beyond which a reading counts less
 TINY = 1e-12  # mm, rad, N: rounding of zero
 
 
@@ -75,7 +73,7 @@ def _sprung_off(gap: Floats) -> Bools:
     edges = np.flatnonzero(np.diff(far, prepend=False, append=False))
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         out[known[first:end]] = springs[first] and springs[end]
-    return out if out.sum() < MANY_FAR * len(known) else np.zeros(len(gap), bool)
+    return out
 
 
 def _as_the_tip_says(bench: Bench, k: int, gap: Floats, odd: Bools) -> Bools:
@@ -106,7 +104,7 @@ def _gone_along(tip: Floats, encoder: Floats, slopes: Floats, bad: Bools) -> Boo
     edges = np.flatnonzero(np.diff(bad.any(axis=1), prepend=False, append=False))
     out = np.zeros(len(tip), bool)
     for first, end in zip(edges[::2], edges[1::2], strict=True):
-        out[first:end] = end - first >= SHORT // 2 and odds[first:end].sum() > SEEN
+        out[first:end] = end - first >= SHORT // 2 and odds[first:end].sum() > 2.0 * EQUAL_LOG_ODDS
     return out
 
 

@@ -11,6 +11,7 @@ from itertools import product
 
 import numpy as np
 
+from camcomp.diagnosis.fit.floor import REPEATABILITY_MM
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion
@@ -19,7 +20,6 @@ _KNOTS = 12  # hats along the travel of an actuator
 _PLACES = 20  # hats along an axis of the workpiece: a bump of a tenth of the travel is still seen
 _MOMENTS = 24  # hats along the time of all runs
 _MOVES = 1e-3  # of the highest speed, from which on something moves
-MOVES_MM = 1e-3  # of an axis of the workpiece on which something can depend on it
 _RELAX_MM = (0.5, 3.0)
 KINDS = ("tip", "encoder", "drive", "dyno")
 
@@ -203,5 +203,5 @@ def _put_moments_and_places(tip: _Store, grounds: Sequence[Ground], rows: int) -
         tip.put(f"time:{axis}", (channel,), [[each[i]] for each in moments])
     places = np.concatenate([g.tip for g in grounds])
     low, span = places.min(axis=0), np.ptp(places, axis=0)
-    for k in np.flatnonzero(span >= MOVES_MM):
+    for k in np.flatnonzero(span >= REPEATABILITY_MM):
         tip.put(f"position:{'xyz'[k]}", range(3), [hats((g.tip[:, k] - low[k]) / span[k], places_of) for g in grounds])

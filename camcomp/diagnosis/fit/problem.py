@@ -18,6 +18,7 @@ from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.diagnosis.statistics.shape_evidence import SoughtShape
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.ground.errors import PhysicsError
@@ -29,7 +30,6 @@ BENT = 9.0  # chi-square by which the model may miss a straight line before all 
 SETTLED = 0.05  # chi-square that one more pass may cost
 FARTHER = 10  # further passes for shapes that are on their way from where they were scanned
 HALVED = 6  # times that a step is halved which no machine can take
-OTHER_LAW_LOG = 3.0  # log evidence by which another law than the nominal one has to be better
 ROWS_AT_ONCE = 256  # in a sum over rows: all of a long run at once are much memory
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 
@@ -142,7 +142,7 @@ class Problem:
                             for m in best.extra}  # fmt: skip
                     laws[i] = {**laws.get(i, {}), p.name: value}
                     other = self._refit(members, best.theta, laws)
-                    if other.log_evidence > best.log_evidence + OTHER_LAW_LOG:
+                    if other.log_evidence > best.log_evidence + EQUAL_LOG_ODDS:
                         best = other
         return best
 
@@ -200,20 +200,23 @@ class Problem:
             both = [np.column_stack(pair) for pair in zip(white, also, strict=True)]
             grams = self._grams_at([*index, *pushed], both, left)
         scale = Scale(total(grams), self.prior, self.candidates)
-        factor = scale.factor(members)
-        mean, full = estimate(total(grams), self.prior, index, factor)
+        mean, full = estimate(total(grams), self.prior, index)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
         return Fitted(
             members=members, theta=theta, covariance=covariance, log_evidence=scale(members, sought), grams=grams,
-            extra=shapes, factor=factor, white=tuple(white), residual=tuple(left), pushed=pushed, pushed_at=pushed_at,
+            extra=shapes, white=tuple(white), residual=tuple(left), pushed=pushed, pushed_at=pushed_at,
         )  # fmt: skip
 
     def _without_members(self) -> Fitted:
         scale = Scale(total(self.base_grams), self.prior, self.candidates)
         return Fitted(
-            members=(), theta=np.zeros(0), covariance=np.zeros((0, 0)), log_evidence=scale(()), grams=self.base_grams,
-            extra={}, factor=scale.factor(()),
-        )  # fmt: skip
+            members=(),
+            theta=np.zeros(0),
+            covariance=np.zeros((0, 0)),
+            log_evidence=scale(()),
+            grams=self.base_grams,
+            extra={},
+        )
 
     def _pushed(self, small: Members, causes: Sequence[Cause]) -> tuple[Floats, ...]:
         """Per run (n, c, p): effect of small forces on the channels of the machine that the causes make."""
@@ -266,7 +269,7 @@ class Problem:
         if len(f.grams) == 1 or not members:
             here = np.array([at.index(c) for c in index], int)
             return f.theta[here], np.sqrt(np.diag(f.covariance))[here]
-        mean, covariance = estimate(total(f.grams) - f.grams[k], self.prior, index, f.factor)
+        mean, covariance = estimate(total(f.grams) - f.grams[k], self.prior, index)
         return self._bounded(members, mean[index]), np.sqrt(np.diag(covariance)[index])
 
     def _stacked(self, k: int, moved: Sequence[Floats | None], index: Sequence[int]) -> Floats:

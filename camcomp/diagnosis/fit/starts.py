@@ -18,6 +18,7 @@ from camcomp.model.seams import missing_rows
 if TYPE_CHECKING:
     from camcomp.diagnosis.fit.bench import Bench
 
+Nuisance = tuple[str, float, list[Floats]]  # name, size, column (n, c) per run
 STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before its play is taken up
 STOOD_MM, STOOD_RAD = 5e-3, 5e-6  # by which it may have moved and stands: a digit of its encoder
 UNDER_WAY = 8  # rows from the one to the other, in which its state is unknown
@@ -28,16 +29,14 @@ ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
 STARTING_ROWS = 2
 SWING_S = 0.03  # times the speed with which a log begins: how far a loop may then stand from where it is told
 SWINGS_S = 0.06  # in which that dies away: loops of 5 to 60 Hz as they are tuned
-BEGUN_ANEW = 3.0  # usual steps between rows from which on a loop's state at the next row is unknown
+BEGUN_ANEW = 3.0  # usual steps between rows: across more the motion, and a loop's state behind them, are unknown
 
 
-def start_columns(
-    bench: Bench, only: Callable[[int, Floats], list[Floats]]
-) -> list[tuple[str, float, list[Floats], bool]]:
+def start_columns(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> list[Nuisance]:
     """One column per run and actuator for the rows before it has moved, where there are enough of them, and one for the force
-    with which its guide holds it: name, size, column per run (as `only` makes it of all rows of one run), whether the size may be off.
+    with which its guide holds it: name, size, column per run (as `only` makes it of all rows of one run).
     """
-    found, m = [], len(bench.actuators)
+    found, m = list[Nuisance](), len(bench.actuators)
     for r, run in enumerate(bench.runs):
         if not run.run_path.ordered:
             continue
@@ -50,12 +49,12 @@ def start_columns(
             shift[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
             begins = still.mean() < 1.0 - ALWAYS
             width = (START_RAD if revolute else START_MM) if begins else (ALWAYS_RAD if revolute else ALWAYS_MM)
-            found.append((f"start.{run.name}.{a}", width, only(r, shift), False))
+            found.append((f"start.{run.name}.{a}", width, only(r, shift)))
             if begins and run.measured.has("drive"):
                 held = np.zeros_like(shift)
                 held[:, 3 + m + j] = still
                 holding = START_NMM if revolute else START_N
-                found.append((f"held.{run.name}.{a}", holding, only(r, held), False))
+                found.append((f"held.{run.name}.{a}", holding, only(r, held)))
     return found
 
 

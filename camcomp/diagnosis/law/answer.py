@@ -17,10 +17,9 @@ from camcomp.diagnosis.law.folds import Folds, Split, usual_split
 from camcomp.diagnosis.law.screen import term_grids
 from camcomp.diagnosis.law.smooth import find_map
 from camcomp.diagnosis.result.types import Law
-from camcomp.diagnosis.search.tempering import tempering
 from camcomp.diagnosis.search.unknown import about, firm_prior
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, temperature_of, total
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats
 
@@ -115,10 +114,10 @@ def _base(problem: Problem, f: Fitted | None, bench: TermBench, kind: str) -> Ca
     On request it has a free constant at every spot of the tip.
     """
     if f is None:
-        white, residual, precision = problem.white, problem.white_residual, firm_prior(problem).precision(1.0)
+        white, residual, precision = problem.white, problem.white_residual, firm_prior(problem).precision
     else:
         white, residual = about(problem, f)
-        precision, members = problem.prior.precision(1.0), problem.member_columns(f.members)
+        precision, members = problem.prior.precision, problem.member_columns(f.members)
         precision[members] = 1.0 / (10.0 * problem.prior.scale[members]) ** 2
     places = [problem.row_places(k) for k in range(len(residual))]
     tips = [s for s in spots(len(problem.bench.actuators), kind) if s.on != "drive"]
@@ -163,7 +162,6 @@ def with_law(problem: Problem, bench: TermBench, found: FoundLaw) -> Problem:
         np.concatenate([old.tolerance, found.precision**-0.5]),
         np.concatenate([old.scale, np.ones(more)]),
         np.concatenate([old.sign, np.zeros(more)]),
-        np.concatenate([old.flexible, np.zeros(more)]),
         np.concatenate([old.reach, np.full(more, np.inf)]),
     )
     own = [bench.channels(t.spot, bench.values(t.spot, t.form)) for t in found.terms]
@@ -191,7 +189,8 @@ def fit_needed(problem: Problem, members: Members) -> Fitted:
         f = problem.refit(members)
         smaller = [tuple(each for each in members if each != i) for i in members]
         scale, prior = Scale(total(f.grams), problem.prior, problem.candidates), problem.candidates.prior
-        temperature, whole = tempering(problem, f), scale(members)
+        temperature = temperature_of(f, problem.prior, problem.member_columns(f.members))
+        whole = scale(members)
         odds = [(whole - scale(less)) / temperature + prior(members) - prior(less) for less in smaller]
         small = problem.small_members(f)
         if min(odds) < 0.0:

@@ -16,12 +16,12 @@ from importlib import resources
 
 import numpy as np
 
+from camcomp.diagnosis.statistics.probability import PLACES
 from camcomp.ground.datatypes import Floats
 
 MOST_LOG_ODDS = 20.0  # beyond it a posterior is as good as certain
 LEAST_PER_LEVEL = 20  # causes of one level of the map: a rate known to a tenth
 BELOW = 8  # log odds: knots of the map where no experiment was, one each
-PLACES = 4  # decimals of a stated probability
 
 
 @dataclass(frozen=True)

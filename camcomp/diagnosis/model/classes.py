@@ -12,10 +12,11 @@ import numpy as np
 
 from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.explain import Explanation
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
 INDISTINGUISHABLE = 9.0  # chi-square of what another set leaves of the effect: three deviations
-EQUAL_LOG_ODDS = 3.0  # odds of 20, Kass and Raftery 1995
+LARGE = 10.0  # size of an effect, in units of the noise, up to which an answer has to be right
 MOST_SETS = 4  # contract: alternatives that are listed
 
 

@@ -18,13 +18,13 @@ from scipy.linalg import eigh
 
 from camcomp.diagnosis.model.evidence import Background, LinearModel, Members
 from camcomp.diagnosis.model.group import Group, SmoothProcess, split_regions
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
 ORDERS = 8  # cosines of a covariate
 SCALES = (1.0, 2.0, 5.0, 10.0, 30.0, 100.0)  # of the floor: size of a covariate's function, or of a family
 SIZES_OF_PROCESS = (0.5, 1.0, 2.0, 4.0, 8.0)  # of the floor
 LENGTHS = {"posture": (0.15, 0.3, 0.6, 1.2), "time": (0.01, 0.03, 0.1, 0.3)}
-CLEAR = 3.0  # log likelihood by which a process has to be better than noise: odds of 20
 ROWS_OF_PROCESS = 250  # of a region on which a process is fitted
 UNKNOWN = 0.2  # prior probability that something unmodelled acts
 EVERYWHERE = 0.01  # prior probability that an effect acts at all its targets
@@ -67,22 +67,26 @@ def gains_of_more(model: LinearModel, background: Background, members: Members) 
     out: dict[Background, float] = {}
     prior = prior_of_covariate(model) - log(len(SCALES))
     for name, (gram, moment) in zip(covariates, blocks, strict=False):
-        for scale, gain in zip(SCALES, _gains(gram, moment), strict=True):
+        for scale, gain in zip(SCALES, gains_at_scales(gram, moment)[0], strict=True):
             out[replace(background, scales=(*background.scales, (name, scale)))] = gain + prior
     prior = prior_of_family(model) - log(len(SCALES))
     for (name, (_, unit)), (gram, moment) in zip(families.items(), blocks[len(covariates) :], strict=True):
-        for scale, gain in zip(SCALES, _gains(unit[:, None] * gram * unit, unit * moment), strict=True):
+        for scale, gain in zip(SCALES, gains_at_scales(unit[:, None] * gram * unit, unit * moment)[0], strict=True):
             out[replace(background, families=(*background.families, (name, scale)))] = gain + prior
     return out
 
 
-def _gains(gram: Floats, moment: Floats) -> Floats:
-    """Log Bayes factors (scales,) of columns with normal equations gram (q, q), moment (q,) at SCALES, against none."""
+def gains_at_scales(gram: Floats, moment: Floats, unit: float = 1.0) -> tuple[Floats, Floats]:
+    """Log Bayes factors (scales,) of columns with normal equations gram (q, q), moment (q,) at SCALES of `unit`, against
+    none, and their amplitudes (q,) at the best of them.
+    """
     size, way = eigh(gram)
-    size, toward = np.maximum(size, 0.0), (way.T @ moment) ** 2
-    square = np.array(SCALES)[:, None] ** 2
+    size, toward = np.maximum(size, 0.0), way.T @ moment
+    square = (unit * np.array(SCALES)[:, None]) ** 2
     grown = 1.0 + square * size
-    return np.asarray(0.5 * ((square * toward / grown).sum(axis=1) - np.log(grown).sum(axis=1)), float)
+    gains = 0.5 * ((square * toward**2 / grown).sum(axis=1) - np.log(grown).sum(axis=1))
+    best = int(np.argmax(gains))
+    return np.asarray(gains, float), way @ (square[best] * toward / grown[best])
 
 
 def fit_process(groups: Sequence[Group], left: Sequence[Floats], over: str) -> SmoothProcess | None:
@@ -100,7 +104,7 @@ def fit_process(groups: Sequence[Group], left: Sequence[Floats], over: str) -> S
         parts += [(at[region == i], r[region == i]) for i in np.unique(region)]
     values = sum(r.size for _, r in parts)
     plain = -0.5 * values * log(max(sum(float((r**2).sum()) for _, r in parts) / values, 1e-300))
-    best: tuple[float, SmoothProcess | None] = plain + CLEAR, None
+    best: tuple[float, SmoothProcess | None] = plain + EQUAL_LOG_ODDS, None
     for length in LENGTHS[over]:
         spectra = []
         for at, r in parts:

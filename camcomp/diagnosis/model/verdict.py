@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-EVEN = 0.5  # probability above which something unmodelled is stated
+from camcomp.diagnosis.statistics.probability import EVEN
+
 SURE = 0.8  # probability from which on a set stands out
 
 Word = Literal["none", "identified", "ambiguous", "unknown"]

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.search.indistinguishable import HIDDEN, LARGE
+from camcomp.diagnosis.model.classes import LARGE
+from camcomp.diagnosis.search.indistinguishable import HIDDEN
 from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.expected_gain import expected_gain
-from camcomp.diagnosis.statistics.seen import seen_apart
+from camcomp.diagnosis.statistics.expected_gain import expected_gain, seen_apart
 from camcomp.ground.datatypes import Floats
 
 if TYPE_CHECKING:

@@ -15,12 +15,13 @@ from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.noise import inflation
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.model.classes import LARGE
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.site import CHANNELS, STRETCH
-from camcomp.diagnosis.search.indistinguishable import HIDDEN, LARGE
+from camcomp.diagnosis.search.indistinguishable import HIDDEN
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
-from camcomp.diagnosis.statistics.seen import seen_apart
+from camcomp.diagnosis.statistics.expected_gain import seen_apart
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import CamcompError
@@ -58,7 +59,7 @@ class Question:
         out = []
         for f in self.rivals:
             index = self.problem.member_columns(f.members)
-            mean, covariance = estimate(total(f.grams), self.problem.prior, index, f.factor)
+            mean, covariance = estimate(total(f.grams), self.problem.prior, index)
             mean[index] = 0.0
             covariance[index, index] += (HIDDEN / LARGE * f.theta) ** 2
             out.append((mean, covariance))

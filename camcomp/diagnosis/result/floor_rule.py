@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from camcomp.diagnosis.model.verdict import EVEN, SURE
+from camcomp.diagnosis.model.verdict import SURE
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, NamedCause, UnknownCause, UnseenShrinkage
+from camcomp.diagnosis.statistics.probability import EVEN
 
 
 def within_floor(result: DiagnosisResult, *, in_forces: bool = False) -> DiagnosisResult:

@@ -10,24 +10,24 @@ from camcomp.diagnosis.fit.gap import is_at_floor
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.verdict import SURE
-from camcomp.diagnosis.search.credible import credibility
+from camcomp.diagnosis.search.credible import MODELLED, credibility
 from camcomp.diagnosis.search.fitted_sets import ROUNDS, FittedSets
-from camcomp.diagnosis.search.indistinguishable import likeness, stand_ins
-from camcomp.diagnosis.search.tempering import misfit, tempering
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
     Members,
     probabilities,
+    temperature_of,
+    total,
 )
+from camcomp.diagnosis.statistics.evidence import misfit
 from camcomp.diagnosis.statistics.probability import EVEN, TEMPERATURE
 from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.diagnosis.statistics.verdict import Verdict, judge
 from camcomp.ground.datatypes import Floats
 
 SAME_EVIDENCE = 2.0  # log evidence by which two sets may differ and still be the same answer, whatever their priors
-GATE_SHARE = 0.1  # of what the causes explain: none is modelled better than that
 GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
 LEFT_OPEN = 0.25  # of what causes explain together: no set explains what leaves more, however large its members are
 INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
@@ -77,18 +77,14 @@ def _weigh_answers(problem: Problem, sets: FittedSets) -> _Weighed:
     best = sets.null
     for _ in range(ROUNDS):
         sets.search_near(best)
-        temperature = tempering(problem, sets.answers()[0])
+        first = sets.answers()[0]
+        temperature = temperature_of(first, problem.prior, problem.member_columns(first.members))
         fits = tuple(sets.answers(temperature))
         probability = probabilities(fits, problem.candidates, temperature)
         best = fits[int(np.argmax(probability))]
         if best.members in sets.searched:
             break
-    by_structure = [sets.fit(members) for members in stand_ins(likeness(problem), best.members, best.theta)]
-    by_structure = [f for f in by_structure if _of_their_signs(problem, f)]
-    fits = tuple(({f.members: f for f in by_structure} | {f.members: f for f in fits}).values())
-    probability = probabilities(fits, problem.candidates, temperature)
-    same = _same(problem, fits, best) + [(best.members, f.members) for f in by_structure]
-    return _Weighed(fits, probability, judge(fits, probability, same), temperature)
+    return _Weighed(fits, probability, judge(fits, probability, _same(problem, fits, best)), temperature)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,11 +184,11 @@ def _least(problem: Problem, f: Fitted) -> float:
 def _modelled(problem: Problem, f: Fitted) -> float:
     """Residual (um at the tip) that errors in a set's own members may explain.
 
-    GATE_SHARE of the largest member or of all together, at most LEFT_OPEN of all together: members that cancel are not
+    MODELLED of the largest member or of all together, at most LEFT_OPEN of all together: members that cancel are not
     modelled more exactly.
     """
     together, alone = problem.moved_um(f), [problem.moved_um(f, (i,)) for i in f.members]
-    return min(GATE_SHARE * max(together, *alone, 0.0), LEFT_OPEN * together)
+    return min(MODELLED * max(together, *alone, 0.0), LEFT_OPEN * together)
 
 
 def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[tuple[Members, Members]]:
@@ -201,10 +197,14 @@ def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[tupl
     Priors of sizes, and of how far off the tolerances are all together: the rows and the stated tolerances have to tell.
     """
     found = []
+
+    def left(f: Fitted) -> float:
+        return misfit(total(f.grams), problem.prior, problem.member_columns(f.members))
+
     for f in fits:
         if f is best or len(f.members) != len(best.members) or not best.members:
             continue
-        behind = 0.5 * (misfit(problem, f) - misfit(problem, best))
+        behind = 0.5 * (left(f) - left(best))
         if min(behind, best.log_evidence - f.log_evidence) < SAME_EVIDENCE and _of_their_signs(problem, f):
             found.append((best.members, f.members))
     return found

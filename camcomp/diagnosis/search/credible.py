@@ -4,7 +4,7 @@ Hypotheses h: nothing unmodelled, or functions of one covariate at one scale. Wi
 
     P(cause i) = sum_(S has i, h) p(S, h) / sum_(S, h) p(S, h),      log p(S, h) = log evidence(S, h) / T + log prior(S, h)
 
-A covariate whose functions do the same as the cause, within LIKE of its size, is the cause under another name.
+A covariate whose functions do the same as the cause, within MODELLED of its size, is the cause under another name.
 
 Sources: Hoeting et al., Statistical Science 14 (1999) 382; Kennedy, O'Hagan, J. R. Statist. Soc. B 63 (2001) 425.
 """
@@ -15,12 +15,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
 from scipy.special import logsumexp
 
 from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.discrepancy import SCALES
+from camcomp.diagnosis.model.discrepancy import gains_at_scales
 from camcomp.diagnosis.search.unknown import joint_products
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, parts_of
 from camcomp.diagnosis.statistics.evidence import base, holding_back, log_bayes
@@ -28,7 +27,7 @@ from camcomp.diagnosis.statistics.score_test import JointProducts
 from camcomp.ground.datatypes import Floats, Ints
 
 UNMODELLED = 0.1  # prior probability of something that the library does not have
-LIKE = 0.1  # of a cause's signal: no cause is modelled better
+MODELLED = 0.1  # of what causes explain: none is modelled better than that
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +44,7 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float
     if not members:
         return Credibility({}, {})
     joint = joint_products(problem, f, _weights(problem))
-    at, groups = base(joint.data, problem.prior, 1.0), covariates(joint)
+    at, groups = base(joint.data, problem.prior), covariates(joint)
     theta, first = dict[int, Floats](), 0
     for i in members:
         theta[i] = f.theta[first : (first := first + len(columns[i]))]
@@ -53,7 +52,7 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float
     for some in parts_of(members):
         index = problem.member_columns(some)
         alone = at.log_evidence - holding_back(at, problem.prior, index)
-        alone += float(log_bayes([at], problem.prior, [[columns[i] for i in some]])[0, 0])
+        alone += float(log_bayes(at, problem.prior, [[columns[i] for i in some]])[0])
         odds, has = problem.candidates.prior(some), [float(i in some) for i in members]
         if not surely:
             value.append(alone / temperature + odds + float(np.log(1.0 - UNMODELLED)))
@@ -61,7 +60,10 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float
             unmodelled.append(False)
         P, h = joint.projected(problem.prior, index)
         for g in groups:
-            gain, amount = _gain(joint, g, P[np.ix_(g, g)], h[g])
+            # a scale is the rms of all rows, in units of the noise
+            unit = float(np.sqrt(joint.rows / np.diag(joint.P)[g].sum()))
+            gains, amount = gains_at_scales(P[np.ix_(g, g)], h[g], unit)
+            gain = float(logsumexp(gains)) - float(np.log(len(gains)))
             value.append((alone + gain) / temperature + odds + float(np.log(UNMODELLED / len(groups))))
             there.append(
                 [
@@ -85,25 +87,12 @@ def covariates(joint: JointProducts) -> list[Ints]:
     return [g for g in found if np.diag(joint.P)[g].any()]
 
 
-def _gain(joint: JointProducts, g: Ints, P: Floats, h: Floats) -> tuple[float, Floats]:
-    """Log evidence that a covariate's functions g (q,) add, over all SCALES, and their amplitudes (q,) at the best of them.
-
-    P (q, q), h (q,): their normal equations with all else integrated out. A scale is the rms of all rows in noise units.
-    """
-    size, way = eigh(P)
-    size, toward = np.maximum(size, 0.0), way.T @ h
-    square = np.array(SCALES)[:, None] ** 2 * joint.rows / float(np.diag(joint.P)[g].sum())
-    gains = 0.5 * (square * toward**2 / (1.0 + square * size) - np.log1p(square * size)).sum(axis=1)
-    best = square[int(np.argmax(gains))]
-    return float(logsumexp(gains) - np.log(len(SCALES))), way @ (best * toward / (1.0 + best * size))
-
-
 def _is_alike(joint: JointProducts, g: Ints, amount: Floats, columns: Members, theta: Floats) -> bool:
     """Whether functions g with amplitudes (q,) do the same as columns (d,) at coordinates theta (d,)."""
     on = np.array(columns)
     own = float(theta @ joint.data.A[np.ix_(on, on)] @ theta)
     apart = own - 2.0 * float(theta @ joint.B[np.ix_(on, g)] @ amount) + float(amount @ joint.P[np.ix_(g, g)] @ amount)
-    return apart < LIKE**2 * own
+    return apart < MODELLED**2 * own
 
 
 def _weights(problem: Problem) -> list[list[float]]:

@@ -6,10 +6,14 @@ the search is repeated about the best fit until it is the same again.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.search import search_sets
-from camcomp.diagnosis.search.linear_sets import LinearSets
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
     Members,
@@ -18,15 +22,41 @@ from camcomp.diagnosis.statistics.cause_sets import (
     total,
     with_minor,
 )
-from camcomp.diagnosis.statistics.evidence import estimate
-from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS
+from camcomp.diagnosis.statistics.evidence import estimate, freed, log_bayes
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground import progress
+from camcomp.ground.datatypes import Floats
 
 SINGLES = 6  # single causes that are fitted in any case
 TRIED = 5  # sets fitted about a fit that are larger than it, and as many of those that are not
 ROUNDS = 6  # fits about which sets are searched
 HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
-LARGE_SCALES = 3.0  # size of an effect, in its typical ones, that would show at least if it can be seen at all
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSets:
+    """Sets weighed by the evidence linearised about one fit, tolerances as stated; for model/search."""
+
+    scale: Scale
+    usable: Sequence[int]
+    candidates: Sequence[PlacedCause]
+
+    def value(self, members: Members) -> float:
+        """Log evidence plus log prior."""
+        at, columns = self.scale.base, self.scale.candidates.columns
+        causes = [columns[i] for i in members]
+        more = float(log_bayes(at, self.scale.prior, [causes])[0]) if causes else 0.0
+        return at.log_evidence + more + self.scale.candidates.prior(members)
+
+    def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
+        """The same (m,) of a set with one of `more` each, the set's own amplitudes free; -inf where two exclude each other."""
+        scale, known = self.scale, self.scale.candidates
+        own = [c for i in members for c in known.columns[i]]
+        at = freed(scale.base, scale.prior, own) if own else scale.base
+        gains = log_bayes(at, scale.prior, [[known.columns[i]] for i in more])
+        gains += [known.prior(tuple(sorted((*members, i)))) for i in more]
+        gains[[any(known.exclusive(i, j) for j in members) for i in more]] = -np.inf
+        return np.asarray(gains + self.value(members) - known.prior(members), float)
 
 
 class FittedSets:
@@ -34,7 +64,8 @@ class FittedSets:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.every = [i for i in range(len(problem.columns.candidates)) if is_visible(problem, i)]
+        seen = np.diag(total(problem.base_grams).A)
+        self.every = [i for i, own in enumerate(problem.candidates.columns) if seen[list(own)].any()]
         self.null = problem.refit(())
         self.done: dict[Members, Fitted] = {(): self.null}
         self.searched = set[Members]()
@@ -92,9 +123,3 @@ class FittedSets:
                 less = self.fit(tuple(i for i in less.members if i not in small))
             found[less.members] = max(found.get(less.members, less), with_minor(less, f), key=value)
         return sorted(found.values(), key=value, reverse=True)
-
-
-def is_visible(problem: Problem, i: int) -> bool:
-    """Whether an effect of three scales would show at all in the channels present."""
-    energy = sum(float((W[:, list(problem.candidates.columns[i])] ** 2).sum()) for W in problem.white)
-    return energy * LARGE_SCALES**2 > 1.0

@@ -7,85 +7,55 @@ subspaces (Bjoerck and Golub, Mathematics of Computation 27, 1973).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import permutations
 
 import numpy as np
 from scipy.linalg import eigh
 
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.statistics.cause_sets import Members, total
-from camcomp.diagnosis.statistics.evidence import base
-from camcomp.ground.datatypes import Floats
+from camcomp.diagnosis.model.classes import LARGE
+from camcomp.diagnosis.statistics.cause_sets import total
+from camcomp.diagnosis.statistics.evidence import Base, Gram, base
 
-LARGE = 10.0  # size of an effect, in units of the noise, up to which an answer has to be right
 HIDDEN = 0.2  # difference of two effects at that size, in units of the noise, below which they are indistinguishable
-_SHOWS = 0.1  # size, in units of the noise, that a typical effect has to reach to be looked at at all
 
 
 @dataclass(frozen=True, eq=False)
 class Likeness:
-    """The design of an experiment: covariance and precision (k, k), (k,) of all columns within tolerance, per kind of
-    channel the Gram matrix (k, k) of its white rows and their number.
-    """
+    """The design of an experiment: posterior of all columns within tolerance, and normal equations of the white rows."""
 
     problem: Problem
-    covariance: Floats
-    precision: Floats
-    grams: tuple[Floats, ...]
-    rows: tuple[int, ...]
+    within: Base
+    data: Gram
 
     def shows(self, i: int) -> bool:
-        """Whether the candidate moves any channel."""
-        return self._kinds[i][1] > _SHOWS
+        """Whether the candidate at `LARGE` times its scale moves the channels by their noise."""
+        own = list(self.problem.candidates.columns[i])
+        return LARGE**2 * float(np.diag(self.data.A)[own].sum()) > self.data.rows
 
-    def apart(self, i: int, free: Sequence[int], direction: Floats | None = None) -> float:
+    def apart(self, i: int, free: Sequence[int]) -> float:
         """Distance, in units of the noise, of candidate i at `LARGE` times the noise from the best fit of the candidates `free`.
 
-        direction (d,): of the parameters of i; that which keeps least when it is not given.
+        Of its parameters that direction counts which keeps least.
         """
         columns, d = self.problem.candidates.columns, len(self.problem.candidates.columns[i])
         index = [*columns[i], *(c for each in free for c in columns[each])]
-        known = np.linalg.inv(self.covariance[np.ix_(index, index)]) - np.diag(self.precision[index])
+        known = np.linalg.inv(self.within.covariance[np.ix_(index, index)]) - np.diag(self.within.precision[index])
         known[d:, d:] += np.diag(1.0 / (10.0 * self.problem.prior.scale[index[d:]]) ** 2)
         left = known[:d, :d] - known[:d, d:] @ np.linalg.solve(known[d:, d:], known[d:, :d])
-        own = self.grams[self._kinds[i][0]][np.ix_(index[:d], index[:d])]
-        if direction is None or d == 1:
-            share = float(eigh(left, own + 1e-12 * np.trace(own) * np.eye(d), eigvals_only=True)[0])
-        else:
-            share = float(direction @ left @ direction) / max(float(direction @ own @ direction), 1e-300)
+        own = self.data.A[np.ix_(index[:d], index[:d])]
+        share = float(eigh(left, own + 1e-12 * np.trace(own) * np.eye(d), eigvals_only=True)[0])
         return LARGE * float(np.sqrt(max(share, 0.0)))
 
-    def told(self, i: int, free: Sequence[int] = (), direction: Floats | None = None) -> bool:
-        """Whether the candidate shows, and nuisances and the candidates `free` leave something of it."""
-        return self.shows(i) and self.apart(i, free, direction) >= HIDDEN
-
-    @cached_property
-    def _kinds(self) -> list[tuple[int, float]]:
-        """Per candidate: the kind of channel in which one of its own scale shows best, and its rms there in units of the noise."""
-        energy = np.array([np.diag(A) / max(n, 1) for A, n in zip(self.grams, self.rows, strict=True)])
-        out = []
-        for columns in self.problem.candidates.columns:
-            size = np.sqrt(np.maximum(energy[:, list(columns)].sum(axis=1), 0.0))
-            best = int(np.argmax(size))
-            out.append((best, float(size[best])))
-        return out
+    def told(self, i: int) -> bool:
+        """Whether the candidate shows, and nuisances leave something of it."""
+        return self.shows(i) and self.apart(i, ()) >= HIDDEN
 
 
 def likeness(problem: Problem) -> Likeness:
     """The design of a problem."""
-    k = len(problem.columns.names)
-    grams = [np.zeros((k, k)) for _ in problem.dictionaries]
-    rows = [0] * len(grams)
-    for white, parts in zip(problem.white, problem.white_patterns, strict=True):
-        at = 0
-        for n, part in enumerate(parts):
-            block = white[at : at + len(part)]
-            grams[n] += block.T @ block
-            rows[n] += len(part)
-            at += len(part)
-    within = base(total(problem.base_grams), problem.prior, 1.0)
-    return Likeness(problem, within.covariance, within.precision, tuple(grams), tuple(rows))
+    data = total(problem.base_grams)
+    return Likeness(problem, base(data, problem.prior), data)
 
 
 def classes(design: Likeness) -> list[tuple[int, ...]]:
@@ -98,18 +68,3 @@ def classes(design: Likeness) -> list[tuple[int, ...]]:
             both = group[i] | group[j]
             group.update(dict.fromkeys(both, both))
     return sorted({tuple(sorted(each)) for each in group.values() if len(each) > 1})
-
-
-def stand_ins(design: Likeness, members: Members, theta: Floats) -> list[Members]:
-    """Sets in which one member is replaced by a candidate that does the same in these runs; theta (d,): the members' coordinates."""
-    candidates, at, found = design.problem.candidates, 0, list[Members]()
-    told = [j for j in range(len(candidates.columns)) if j not in members and design.told(j)]
-    for i in members:
-        direction = theta[at : (at := at + len(candidates.columns[i]))]
-        others = tuple(m for m in members if m != i)
-        if not design.told(i, others, direction):
-            continue  # another member does what it does
-        free = [j for j in told if not any(candidates.exclusive(j, m) for m in members)]
-        alike = [j for j in free if design.apart(i, (j, *others), direction) < HIDDEN]
-        found += [tuple(sorted((*others, j))) for j in alike]
-    return found

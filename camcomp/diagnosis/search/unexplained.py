@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr
+from scipy.special import log_ndtr, ndtri
 
 from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.floor import row_scatter
@@ -20,10 +20,9 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import BLOCK
+from camcomp.diagnosis.statistics.shrinkage import SURELY
 from camcomp.ground.datatypes import Bools, Floats
 
-UNDETERMINED = 0.5  # of a cause's size: runs that know it to no better do not determine it
-FEW_RUNS = 3  # from which on causes are fitted to the other runs
 KINDS = ("tip", "encoder", "drive", "dyno")
 SURE_Z = 5.0  # standard deviations of chance
 TINY = 1e-12  # mm2, below which no noise is
@@ -66,14 +65,14 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
     """
     bench = problem.bench
     theta = f.theta
-    if len(bench.runs) >= FEW_RUNS:
+    if len(bench.runs) > 1:
         widths = [len(problem.candidates.columns[i]) for i in f.members]
         passing = np.repeat([problem.passing(i) for i in f.members], widths).astype(bool)
         without, doubt = problem.determined_without(f, k)
         theta = np.where(passing | undetermined(theta, doubt, widths), theta, without)
     left = bench.difference(k, bench.read(k, problem.causes(f.members, theta, f.extra)))
     index = problem.member_columns(f.members)
-    usual = estimate(total(f.grams), problem.prior, index, 1.0)[0]
+    usual = estimate(total(f.grams), problem.prior, index)[0]
     usual[index] = 0.0
     if f.pushed:
         pushed = list(f.pushed)
@@ -83,10 +82,10 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
 
 
 def undetermined(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
-    """Mask (d,) of coordinates theta that runs do not determine, given their deviations doubt (d,); a cause of `widths`
+    """Mask (d,) of coordinates theta whose 95 % interval holds zero, given their deviations doubt (d,); a cause of `widths`
     coordinates is masked as a whole.
     """
-    faint, ends = doubt > UNDETERMINED * np.abs(theta), np.cumsum(widths)
+    faint, ends = ndtri(SURELY) * doubt > np.abs(theta), np.cumsum(widths)
     each = [bool(faint[end - width : end].all()) for end, width in zip(ends, widths, strict=True)]
     return np.repeat(each, widths).astype(bool)
 

@@ -29,11 +29,6 @@ class ByChannel:
         every = list(channels)
         return cls(every[0].shape[1], tuple(_not_zero(np.arange(each.shape[1]), each) for each in every))
 
-    @classmethod
-    def behind(cls, runs: Sequence[ByChannel]) -> ByChannel:
-        """The rows of one run behind those of the other."""
-        return cls(runs[0].width, tuple(part for each in runs for part in each.parts))
-
     @cached_property
     def _starts(self) -> list[int]:
         return [int(n) for n in np.cumsum([0, *(len(X) for _, X in self.parts)])]
@@ -102,18 +97,6 @@ class ByChannel:
         """With more columns (w, d) behind its own."""
         new = np.arange(self.width, self.width + columns.shape[1])
         return ByChannel(self.width + len(new), self.parts).exchanged(new, columns)
-
-    def scaled(self, weight: Floats) -> ByChannel:
-        """Every row times its weight (w,)."""
-        each = zip(self.parts, self._starts, strict=False)
-        return ByChannel(self.width, tuple((on, weight[at : at + len(X), None] * X) for (on, X), at in each))
-
-    def energy(self) -> Floats:
-        """Sum (k,) of the squares of every column."""
-        out = np.zeros(self.width)
-        for on, X in self.parts:
-            out[on] += np.sum(X**2, axis=0)
-        return out
 
     def dense(self, rows: slice = slice(None)) -> Floats:
         """Every value (n, c, k) of channels that have n rows each, or of some of these rows."""

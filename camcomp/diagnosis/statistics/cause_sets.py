@@ -11,16 +11,15 @@ from math import comb, factorial
 import numpy as np
 
 from camcomp.diagnosis.statistics.evidence import (
-    TOLERANCE_LOG,
-    TOLERANCES,
-    Base,
     Gram,
     Prior,
     base,
     holding_back,
     log_bayes,
     log_sum,
+    misfit,
 )
+from camcomp.diagnosis.statistics.probability import TEMPERATURE
 from camcomp.diagnosis.statistics.shape_evidence import SoughtShape, shape_log_evidence
 from camcomp.ground.datatypes import Floats
 
@@ -41,7 +40,6 @@ class Fitted:
     log_evidence: float
     grams: tuple[Gram, ...]  # per run, about the fit, in absolute coordinates
     extra: Mapping[int, Mapping[str, float]] = field(default_factory=dict)  # scanned shapes by candidate
-    factor: float = 1.0  # the tolerances, as far off as the data have them
     white: tuple[Floats, ...] = ()  # per run (w, d), the members' columns at the fit
     residual: tuple[Floats, ...] = ()  # per run (w,), in absolute coordinates
     pushed: tuple[int, ...] = ()  # columns (p,) of small forces that springs changed by the members feel otherwise
@@ -125,44 +123,32 @@ def total(grams: Sequence[Gram]) -> Gram:
     return out
 
 
+def temperature_of(f: Fitted, prior: Prior, index: Sequence[int]) -> float:
+    """What log evidence is divided by where a set with columns `index` is the best: no model is as good as its noise, and
+    one that leaves more than noise is worth less by as much (quasi-likelihood).
+    """
+    data = total(f.grams)
+    return TEMPERATURE * max(1.0, misfit(data, prior, index) / max(data.rows, 1))
+
+
 class Scale:
-    """Evidence of sets of candidates for one gram, averaged over how far off the tolerances may be."""
+    """Evidence of sets of candidates for one gram; base: the posterior of no cause."""
 
     def __init__(self, data: Gram, prior: Prior, candidates: CausePrior) -> None:
         self.prior, self.candidates = prior, candidates
-        self.bases: list[Base] = [base(data, prior, f) for f in TOLERANCES]
-
-    @property
-    def at_stated(self) -> Base:
-        """The posterior of no cause with the tolerances as stated."""
-        return self.bases[TOLERANCES.index(1.0)]
+        self.base = base(data, prior)
 
     def __call__(self, members: Members, sought: Mapping[int, Sequence[SoughtShape]] | None = None) -> float:
         """Log evidence of a set; sought: shapes by candidate at whose best values the columns are."""
-        values = self._by_tolerance(members, sought or {})
-        return log_sum(values) - float(np.log(len(values)))
-
-    def factor(self, members: Members) -> float:
-        """How far off the tolerances most likely are, given a set."""
-        return TOLERANCES[int(np.argmax(self._by_tolerance(members, {})))]
-
-    def _by_tolerance(self, members: Members, sought: Mapping[int, Sequence[SoughtShape]]) -> Floats:
         columns = self.candidates.columns
-        index = [c for i in members for c in columns[i]]
-        none = np.array([
-            b.log_evidence + odds - holding_back(b, self.prior, index)
-            for b, odds in zip(self.bases, TOLERANCE_LOG, strict=True)
-        ])  # fmt: skip
+        none = self.base.log_evidence - holding_back(self.base, self.prior, [c for i in members for c in columns[i]])
         if not members:
             return none
         ways = self.candidates.ways(members)
-        each = [
-            odds
-            + shape_log_evidence(groups, sought)
-            + log_bayes(self.bases, self.prior, [[[c for i in group for c in columns[i]] for group in groups]])[:, 0]
-            for odds, groups in ways
-        ]
-        return np.asarray(none + np.logaddexp.reduce(each) - log_sum([odds for odds, _ in ways]))
+        sets = [[[c for i in group for c in columns[i]] for group in groups] for _, groups in ways]
+        odds = np.array([each for each, _ in ways])
+        shapes = [shape_log_evidence(groups, sought or {}) for _, groups in ways]
+        return none + log_sum(odds + shapes + log_bayes(self.base, self.prior, sets)) - log_sum(odds)
 
 
 def scored(scale: Scale, sets: Iterable[Members]) -> list[tuple[float, Members]]:

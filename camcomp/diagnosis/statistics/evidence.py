@@ -30,9 +30,7 @@ from camcomp.ground.datatypes import Floats, Ints
 
 PRIOR_WIDTHS = np.array([0.02, 0.1, 0.5, 2.5])
 _WEIGHTS = np.log([0.2, 0.25, 0.3, 0.25])
-TOLERANCES = (0.2, 0.5, 1.0, 2.0)  # by how much the tolerances may be off, all together
 PASSES = 30  # of the search for columns at the end of their reach
-TOLERANCE_LOG = (0.0, 0.0, 0.0, -6.0)  # and the log odds of it: an effect is not to hide in them
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,26 +64,24 @@ def gram(D: Floats | ByChannel, r: Floats) -> Gram:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """For every column (k,): tolerance = narrow size (inf = free nuisance), scale = wide size, sign; flexible (k,) bool
-    = its tolerance is one of those that may be off together; reach = farthest that it goes without being a cause.
+    """For every column (k,): tolerance = narrow size (inf = free nuisance), scale = wide size, sign; reach = farthest that
+    it goes without being a cause.
     """
 
     tolerance: Floats
     scale: Floats
     sign: Floats
-    flexible: Floats
     reach: Floats
 
-    def precision(self, factor: float) -> Floats:
-        """Narrow precision (k,) with the flexible tolerances taken `factor` times."""
-        size = np.where(self.flexible > 0, self.tolerance * factor, self.tolerance)
-        with np.errstate(divide="ignore"):
-            return np.where(np.isinf(size), 1e-12, 1.0 / np.maximum(size, 1e-15) ** 2)
+    @property
+    def precision(self) -> Floats:
+        """Narrow precision (k,)."""
+        return np.where(np.isinf(self.tolerance), 1e-12, 1.0 / np.maximum(self.tolerance, 1e-15) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """No cause at all: posterior of all columns (mean (k,), covariance (k, k)) and log evidence, for one tolerance."""
+    """No cause at all: posterior of all columns (mean (k,), covariance (k, k)) and log evidence."""
 
     mean: Floats
     covariance: Floats
@@ -93,9 +89,9 @@ class Base:
     log_evidence: float
 
 
-def base(data: Gram, prior: Prior, factor: float) -> Base:
-    """Posterior with every column within `factor` times its tolerance."""
-    precision = prior.precision(factor)
+def base(data: Gram, prior: Prior) -> Base:
+    """Posterior with every column within its tolerance."""
+    precision = prior.precision
     # scaled so that the factorisation does not mix mm with ppm
     size = 1.0 / np.sqrt(np.diag(data.A) + precision)
     scaled = size[:, None] * data.A * size + np.diag(precision * size**2)
@@ -115,37 +111,34 @@ def _inverse(scaled: Floats, size: Floats) -> tuple[Floats, float]:
     return size[:, None] * inverse * size, float(log_det)
 
 
-def log_bayes(at: Sequence[Base], prior: Prior, sets: Sequence[Sequence[Sequence[int]]]) -> Floats:
-    """Log Bayes factor (b, s) of sets of causes (each the columns of every cause) against no cause, for every base.
+def log_bayes(at: Base, prior: Prior, sets: Sequence[Sequence[Sequence[int]]]) -> Floats:
+    """Log Bayes factor (s,) of sets of causes (each the columns of every cause) against no cause.
 
     Sets whose causes have the same numbers of columns are worked out at once.
     """
-    out = np.zeros((len(at), len(sets)))
+    out = np.zeros(len(sets))
     shapes = [tuple(map(len, causes)) for causes in sets]
     for shape in {each for each in shapes if each}:
         own = [i for i, each in enumerate(shapes) if each == shape]
         index = np.array([[c for cause in sets[i] for c in cause] for i in own])
-        out[:, own] = _log_bayes(at, prior, index, np.repeat(np.arange(len(shape)), shape))
+        out[own] = _log_bayes(at, prior, index, np.repeat(np.arange(len(shape)), shape))
     return out
 
 
-def _log_bayes(at: Sequence[Base], prior: Prior, index: Ints, cause: Ints) -> Floats:
-    """The same (b, s) of sets with columns index (s, d), which belong to the causes (d,)."""
-    count, d = index.shape
-    C = np.concatenate([each.covariance[index[:, :, None], index[:, None]] for each in at])
-    mean = np.concatenate([each.mean[index] for each in at])
-    narrow = np.concatenate([each.precision[index] for each in at])
-    inverse = np.linalg.inv(C)
+def _log_bayes(at: Base, prior: Prior, index: Ints, cause: Ints) -> Floats:
+    """The same (s,) of sets with columns index (s, d), which belong to the causes (d,)."""
+    mean, narrow = at.mean[index], at.precision[index]
+    inverse = np.linalg.inv(at.covariance[index[:, :, None], index[:, None]])
     h = (inverse @ mean[:, :, None])[:, :, 0]
     sizes, weight = _widths(int(cause[-1]) + 1)
-    wide = np.tile(1.0 / (prior.scale[index][:, None] * sizes[:, cause]) ** 2, (len(at), 1, 1))  # (b s, w, d)
+    wide = 1.0 / (prior.scale[index][:, None] * sizes[:, cause]) ** 2  # (s, w, d)
     wide = np.minimum(wide, narrow[:, None])  # a cause is at least as wide as its tolerance
-    posterior, spread, fit, log_det = _posteriors(inverse - narrow[:, :, None] * np.eye(d), h, wide)
+    posterior, spread, fit, log_det = _posteriors(inverse - narrow[:, :, None] * np.eye(len(cause)), h, wide)
     none = np.log(narrow).sum(axis=1) - np.linalg.slogdet(inverse)[1] + np.sum(mean * h, axis=1)
     value = 0.5 * (fit + np.log(wide).sum(axis=2) - log_det - none[:, None]) + weight
-    signed = np.tile(prior.sign[index] > 0, (len(at), 1))[:, None]
+    signed = prior.sign[index][:, None] > 0
     value += np.where(signed, log_ndtr(posterior / spread) + np.log(2.0), 0.0).sum(axis=2)
-    return np.asarray(logsumexp(value, axis=1).reshape(len(at), count), float)
+    return np.asarray(logsumexp(value, axis=1), float)
 
 
 def _widths(count: int) -> tuple[Floats, Floats]:
@@ -161,14 +154,14 @@ def _choices(count: int, widths: int) -> Ints:
 
 @kept
 def _posteriors(likelihood, h, wide):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Per base (b) and prior precision wide (b, w, d): mean and deviation (b, w, d), h's mean and log determinant (b, w) of the
+    """Per set (s) and prior precision wide (s, w, d): mean and deviation (s, w, d), h's mean and log determinant (s, w) of the
     precision. The inverse by Gauss and Jordan; the determinant is infinite where the precision is none.
     """
-    bases, n, d = wide.shape
-    mean, spread = np.zeros((bases, n, d)), np.ones((bases, n, d))
-    fit, log_det = np.zeros((bases, n)), np.zeros((bases, n))
+    sets, n, d = wide.shape
+    mean, spread = np.zeros((sets, n, d)), np.ones((sets, n, d))
+    fit, log_det = np.zeros((sets, n)), np.zeros((sets, n))
     A = np.zeros((d, d))
-    for b in range(bases):
+    for b in range(sets):
         for w in range(n):
             A[:] = likelihood[b]
             for i in range(d):
@@ -197,21 +190,21 @@ def _posteriors(likelihood, h, wide):  # type: ignore[no-untyped-def]  # pragma:
     return mean, spread, fit, log_det
 
 
-def estimate(data: Gram, prior: Prior, members: Sequence[int], factor: float = 1.0) -> tuple[Floats, Floats]:
+def estimate(data: Gram, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
     """Mode (k,) and covariance (k, k) with the columns `members` free within 10 scales, the others within tolerance and reach.
 
     The covariance is that without the ends of the reaches: never too small.
     """
-    precision = estimate_precision(prior, members, factor)
+    precision = estimate_precision(prior, members)
     size = 1.0 / np.sqrt(np.diag(data.A) + precision)
     scaled = size[:, None] * data.A * size + np.diag(precision * size**2)
     covariance, _ = _inverse(scaled, size)
     return within(covariance @ data.b, lambda held: covariance[:, held], _reach(prior, members))[0], covariance
 
 
-def estimate_precision(prior: Prior, members: Sequence[int], factor: float = 1.0) -> Floats:
+def estimate_precision(prior: Prior, members: Sequence[int]) -> Floats:
     """Precision (k,) with the columns `members` free within 10 scales, the others within tolerance."""
-    precision = prior.precision(factor)
+    precision = prior.precision
     precision[list(members)] = _free(prior, members)
     return precision
 
@@ -238,6 +231,14 @@ def holding_back(at: Base, prior: Prior, members: Sequence[int]) -> float:
     own, gain = _widened(at, prior, index)
     mean = at.mean - own @ (gain @ at.mean[index])
     return within(mean, lambda held: at.covariance[:, held] - own @ (gain @ own[held].T), _reach(prior, index))[1]
+
+
+def misfit(data: Gram, prior: Prior, members: Sequence[int]) -> float:
+    """Minimum chi-square with the columns `members` free and all others within tolerance, penalties included."""
+    mean, _ = estimate(data, prior, members)
+    precision = prior.precision
+    precision[list(members)] = 0.0
+    return float(data.c - 2.0 * data.b @ mean + mean @ data.A @ mean + precision @ mean**2)
 
 
 def _free(prior: Prior, members: Sequence[int]) -> Floats:

@@ -25,6 +25,15 @@ def expected_gain(apart: Floats, probability: Floats) -> float:
     return max(_entropy(probability) - float(after), 0.0)
 
 
+def seen_apart(signals: Floats, left: Floats, hidden: float, large: float) -> float:
+    """Chi-square of white rows `left` (w,) beyond the model error of signals (w, 2), for any number of rows.
+
+    hidden: model error, in units of the noise, of signals `large` times the noise.
+    """
+    own = np.max(signals**2, axis=1) / large**2
+    return max(float((left**2).sum()) - hidden**2 * (len(left) + float(own.sum())), 0.0)
+
+
 def _entropy(p: Floats) -> float:
     p = p[p > 1e-12]
     return float(-(p * np.log2(p)).sum())

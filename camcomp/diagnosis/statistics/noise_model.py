@@ -11,9 +11,9 @@ import numpy as np
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.model.seams import missing_rows
 
 BLOCK = 8  # rows that are averaged, or whose noise shares a sign
-REGULAR = 1.6  # a step longer than this many usual steps is a gap
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +106,7 @@ def starts(time: Floats, present: Bools) -> Bools:
     index = np.flatnonzero(present)
     if len(index) == 0:
         return np.zeros(0, bool)
-    step = np.diff(time[index])
-    usual = float(np.median(step)) if len(step) else 1.0
-    gap = (step > REGULAR * usual) | (step < 0) if usual > 0 else np.ones(len(step), bool)
-    return np.concatenate([[True], gap])
+    return np.concatenate([[True], missing_rows(time[index]) | (np.diff(time[index]) <= 0.0)])
 
 
 def effective_rows(noise: Noise, channel: int, n: int) -> float:

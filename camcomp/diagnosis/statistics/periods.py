@@ -14,9 +14,8 @@ from camcomp.diagnosis.statistics.places import RunGap
 from camcomp.ground.datatypes import Floats
 
 _CHANCE = 1e-3
-_TREND = 4  # terms of the polynomial that is taken out with the sines
-_LEAST_TURNS = 2.5  # periods on the travel below which a line is a trend
-_PER_PERIOD = 2.5  # rows a period needs
+_TREND = 4  # terms of the polynomial that is taken out with the sines, and half waves of the longest period
+_PER_PERIOD = 2.0  # rows that a period needs, by the sampling theorem
 _STANDS_OUT = 0.2  # share of what the trend leaves
 _AT_ONCE = 1_000_000  # values held in memory
 _AGREE = 0.6  # by how much both directions may differ, in units of their sum
@@ -79,7 +78,7 @@ def screws(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLine]:
         if span <= 0.0 or step <= 0.0 or len(y) < 30:
             continue
         thin = float(np.mean([r.thin for r in runs]))
-        frequencies = np.arange(_LEAST_TURNS / span, min(1.0 / (_PER_PERIOD * step), 2.0), 0.25 / span)
+        frequencies = np.arange(0.5 * _TREND / span, min(1.0 / (_PER_PERIOD * step), 2.0), 0.25 / span)
         if len(frequencies) == 0:
             continue
         explained, energy = _spectrum(y, x, frequencies, _trend(x, sign))
@@ -111,7 +110,7 @@ def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLi
         shortest = min(float(np.ptp(t)) for _, t, _ in parts)
         step = max(float(np.median(np.diff(t))) for _, t, _ in parts)
         tried = np.arange(
-            _LEAST_TURNS / shortest, 1.0 / (_PER_PERIOD * step), 0.25 / max(float(np.ptp(t)) for _, t, _ in parts)
+            0.5 * _TREND / shortest, 1.0 / (_PER_PERIOD * step), 0.25 / max(float(np.ptp(t)) for _, t, _ in parts)
         )
         if len(tried) == 0:
             continue

@@ -16,8 +16,6 @@ from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate_precision
 from camcomp.ground.datatypes import Floats, Ints
 
-_DETERMINED = 0.01  # share of its information that a direction keeps jointly with the others, below which it is the noise's colour
-
 
 @dataclass(frozen=True, eq=False)
 class ResidualTest:
@@ -101,13 +99,7 @@ def score_test(joint: JointProducts, P: Floats, h: Floats, rows: Mapping[str, in
     for kind in dict.fromkeys(joint.kinds):
         mine = np.flatnonzero(np.array(joint.kinds) == kind)
         own, b = P[np.ix_(mine, mine)], h[mine]
-        usable = np.diag(own) > 1e-6 * np.maximum(np.diag(joint.P)[mine], 1e-30)
-        scale = np.sqrt(np.maximum(np.diag(own)[usable], 1e-30))
-        value, vector = np.linalg.eigh(own[np.ix_(usable, usable)] / scale[:, None] / scale)
-        keep = value > _DETERMINED
-        z = (vector[:, keep] / np.sqrt(value[keep])).T @ (b[usable] / scale)
-        freedom, total = max(int(keep.sum()), 1), float(z @ z)
-        rms = float(np.sqrt(max(total - freedom, 0.0) / rows[kind]))
+        rms = float(np.sqrt(_explained(own, b, np.arange(len(mine))) / rows[kind]))
         out[kind] = ResidualTest(kind, rms, rows[kind], _shares(own, b, [joint.labels[i] for i in mine]))
     return out
 
@@ -116,9 +108,9 @@ def _explained(P: Floats, h: Floats, index: Ints) -> float:
     if not len(index):
         return 0.0
     size = np.sqrt(np.maximum(np.diag(P)[index], 1e-30))
-    block = P[np.ix_(index, index)] / size[:, None] / size + 1e-3 * np.eye(len(index))
     g = h[index] / size
-    return max(float(g @ np.linalg.solve(block, g)) - len(index), 0.0)
+    amount, _, freedom, _ = np.linalg.lstsq(P[np.ix_(index, index)] / size[:, None] / size, g, rcond=1e-3)
+    return max(float(g @ amount) - int(freedom), 0.0)
 
 
 def _shares(P: Floats, h: Floats, labels: Sequence[str]) -> tuple[tuple[str, float], ...]:

@@ -1,13 +1,14 @@
-"""How far the gap shrinks on runs that the fit has not seen, with the interval of one more run."""
+"""How far the gap shrinks on runs that the fit has not seen, with the interval of one more run: logarithms of the ratio are taken as normal."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
-from camcomp.diagnosis.statistics.one_more import log_ratio, of_one_more, scatter
 from camcomp.ground.datatypes import Floats
 
+SURELY = 0.975  # both ends of 95 %
 USUAL_SPREAD = 0.3  # by which runs differ in the logarithm of the ratio: some cut, some hardly move an axis
 USUAL_RUNS = 2  # that this is worth beside those at hand
 
@@ -40,3 +41,24 @@ def shrinkage(before: Sequence[Floats], after: Sequence[Floats]) -> Shrinkage:
     low, high = of_one_more(float(each.mean()), square, freedom, 1.0 + 1.0 / len(each))
     worst = min(0.0, 1.0 - float(np.exp(each.max())))
     return Shrinkage(1e3 * first, 1e3 * last, ratio, min(max(low, worst), ratio), max(high, ratio))
+
+
+def log_ratio(before: float, after: float) -> float:
+    """Logarithm of the ratio of two rms, from their mean squares."""
+    return 0.5 * float(np.log(max(after, 1e-300) / max(before, 1e-300)))
+
+
+def scatter(each: Floats) -> tuple[float, int]:
+    """Sum of squares about the mean of values (n,), and its degrees of freedom."""
+    return float(((each - each.mean()) ** 2).sum()), len(each) - 1
+
+
+def of_one_more(middle: float, square: float, freedom: int, more: float) -> tuple[float, float]:
+    """95 % interval of the shrinkage (1 less the ratio) of one more. Student's t.
+
+    middle: of the logarithms; square, freedom: what they scatter by; more: variance of one more beside that mean, in
+    variances of one.
+    """
+    freedom = max(freedom, 1)
+    half = float(student.ppf(SURELY, freedom)) * float(np.sqrt(square / freedom * more))
+    return 1.0 - float(np.exp(middle + half)), 1.0 - float(np.exp(middle - half))

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
-
-EQUAL_LOG_ODDS = 3.0  # odds of 20, Kass and Raftery 1995: sets closer than that are not told apart
 
 
 @dataclass(frozen=True, eq=False)

@@ -139,8 +139,8 @@ def test_memory_of_rows_is_taken_out():
 
 def test_noise_of_a_recording():
     rng = np.random.default_rng(8)
-    assert resolution_of(np.round(rng.normal(0.0, 50.0, 200), 1)) == 0.1
-    assert resolution_of(np.round(rng.normal(0.0, 50.0, 200) * 2.0) / 2.0) == 0.5
+    assert resolution_of(np.round(rng.normal(0.0, 50.0, 200), 1)) == pytest.approx(0.1)
+    assert resolution_of(np.round(rng.normal(0.0, 50.0, 200) * 2.0) / 2.0) == pytest.approx(0.5)
     assert resolution_of(rng.normal(0.0, 50.0, 200)) == 0.0
 
 

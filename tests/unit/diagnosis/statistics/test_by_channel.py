@@ -61,17 +61,15 @@ def test_rows_and_columns_are_picked_as_from_an_array(lean, whole):
     assert lean[:, []].shape == (len(whole), 0)
 
 
-def test_columns_are_exchanged_and_put_beside_rows_weighed_and_runs_joined(lean, whole):
+def test_columns_are_exchanged_and_put_beside(lean, whole):
     rng = np.random.default_rng(3)
-    new, weight, every = rng.standard_normal((len(whole), 2)), rng.random(len(whole)), np.arange(K)
+    new, every = rng.standard_normal((len(whole), 2)), np.arange(K)
     new[:N, 1] = 0.0
     changed = whole.copy()
     changed[:, [4, 0]] = new
     assert np.array_equal(lean.exchanged([4, 0], new)[:, every], changed)
     assert np.array_equal(lean[:, every], whole), "it stays what it was"
     assert np.array_equal(lean.appended(new)[:, np.arange(K + 2)], np.concatenate([whole, new], axis=1))
-    assert np.array_equal(lean.scaled(weight)[:, every], weight[:, None] * whole)
-    assert np.array_equal(ByChannel.behind([lean, lean])[:, every], np.concatenate([whole, whole]))
 
 
 def test_it_is_made_white_as_an_array_is(lean, values):

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.statistics.one_more import of_one_more, scatter
-from camcomp.diagnosis.statistics.shrinkage import shrinkage
+from camcomp.diagnosis.statistics.shrinkage import of_one_more, scatter, shrinkage
 
 
 def runs(*ratios, rows=100):
