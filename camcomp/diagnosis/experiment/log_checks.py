@@ -164,12 +164,11 @@ def check_rows_together(
             return np.inf
         return float(np.median(np.linalg.norm(apart - np.median(apart, axis=0), axis=1)))  # less the constant part
 
-    here = off(0)
-    for by in ROWS_APART:
-        if abs(by) * usual > LATEST_S and off(by) < 0.5 * here:
-            way = "behind" if by < 0 else "ahead of"
-            message = f"run '{run}': the {what} {abs(by)} row{'s' if abs(by) > 1 else ''} {way} {other}"
-            raise ConfigError("CC412", message, at=Location(name, 1, 1))
+    by = min((0, *(each for each in ROWS_APART if abs(each) * usual > LATEST_S)), key=off)
+    if by and off(by) < 0.5 * off(0):
+        way = "behind" if by < 0 else "ahead of"
+        message = f"run '{run}': the {what} {abs(by)} row{'s' if abs(by) > 1 else ''} {way} {other}"
+        raise ConfigError("CC412", message, at=Location(name, 1, 1))
 
 
 def check_places(

@@ -16,11 +16,12 @@ from camcomp.diagnosis.model.noise import resolution_of, rounding_noise
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.seams import missing_rows
 
+CLIPPED = 6.0  # robust deviations beyond which a difference of rows is no noise
 LEAST_ROWS = 10  # of a run with a program, for an estimate of its noise
-HEAVY = 3.5  # robust deviations beyond which a reading counts less
 REPEATABILITY_MM = 0.001  # of a run, per axis, where nothing is stated (contract, section 5)
 GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effect that the library lacks
 MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause, whatever its significance (contract, section 6)
+LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
 HEALTHY = 0.08  # of the noise floor at the tip: what of every effect is within tolerance
 STRETCH, LEAST_STRETCHES = 16, 8  # differences of rows that make a stretch, and stretches that tell a quiet one
 LOWER_QUARTILE = 0.82  # of the scatter of such stretches of white noise, in units of the noise (4000 draws: 0.816)
@@ -113,11 +114,11 @@ def _bends(values: Floats, time: Floats) -> Floats | None:
     if not len(bend):
         return None
     middle = 1.4826 * float(np.median(np.abs(bend)))
-    return np.asarray(bend if middle == 0.0 else np.clip(bend, -HEAVY * middle, HEAVY * middle))
+    return np.asarray(bend if middle == 0.0 else np.clip(bend, -CLIPPED * middle, CLIPPED * middle))
 
 
 def least_noise(bench: Bench, floor: NoiseFloor) -> Floats:
-    """Least standard deviation (c,) of every channel: what moves the tip by HEALTHY of the floor, or one digit.
+    """Least standard deviation (c,) of every channel: what moves the tip by LEAST_SHARE of the floor, or one digit.
 
     The resolution of a channel is noise, and no finding, however sharp.
     """
@@ -128,7 +129,7 @@ def least_noise(bench: Bench, floor: NoiseFloor) -> Floats:
         slopes = bench.slopes[k].at(run.run_path.row_place)
         way = np.maximum(way, np.sqrt(np.mean(np.sum(slopes.tip_rho**2, axis=1), axis=0)))
         push = max(push, float(np.sqrt(np.mean(np.sum(slopes.tip_wrench[:, :, :3] ** 2, axis=(1, 2))))))
-    axis = HEALTHY * floor.axis_mm
+    axis = LEAST_SHARE * floor.axis_mm
     carriage = axis / np.maximum(way, 1e-9)
     springs = np.array([np.inf if a.stiffness is None else a.stiffness for a in bench.twin.robot.actuators])
     drive = carriage * np.where(np.isfinite(springs), springs, 1e4)

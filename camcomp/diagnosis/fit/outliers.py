@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter
 from scipy.stats import norm
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
-from camcomp.diagnosis.fit.floor import HEAVY, LEAST_ROWS
+from camcomp.diagnosis.fit.floor import LEAST_ROWS
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Bools, Floats
 
@@ -19,6 +19,7 @@ SHORT, LONG = 7, 61  # rows of the running medians
 GROSS = 160.0  # robust deviations from the rows around it by which several rows in a row are off
 MANY = 0.02  # of the rows: more are no outliers
 FAR_MM = 5.0  # no machine is wrong by so much from one row to the next
+HEAVY = 3.5  # robust deviations beyond which a reading counts less
 TINY = 1e-12  # mm, rad, N: rounding of zero
 
 
