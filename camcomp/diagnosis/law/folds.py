@@ -216,7 +216,7 @@ def _without_each(parts: Sequence[Floats]) -> list[Floats]:
 
 def _grams(parts: Sequence[Floats], count: int) -> Floats:
     """Products (f, count, count) of columns (n, f count) of which each `count` belong together, over all parts of the rows."""
-    blocks = [X.reshape(len(X), -1, count) for X in parts]
+    blocks = [X.reshape(len(X), X.shape[1] // count, count) for X in parts]
     return np.asarray(np.sum([np.einsum("nfc,nfd->fcd", each, each) for each in blocks], axis=0))
 
 

@@ -6,7 +6,7 @@ from scipy.stats import multivariate_normal
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term
 from camcomp.diagnosis.law.find import margin, unlikely
-from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, White, gains, usual_split, withheld
+from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, White, _grams, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import at_drive, at_tip
 from camcomp.diagnosis.law.library import LearnedLaw, keep, learned
 from camcomp.diagnosis.law.sizes import Sizes
@@ -147,3 +147,8 @@ def test_a_library_gives_back_terms_that_have_their_own_size(tmp_path):
 def test_a_law_over_a_drives_load_waits_for_a_machine_that_has_the_drive():
     found = LearnedLaw("found", "lathe", law_of(("load_x_N", 1e-4)))
     assert found.candidate(("y", "z")) is None and found.candidate(("x", "y")) is not None
+
+
+def test_a_run_in_which_a_channel_has_no_row_adds_nothing_to_its_products():
+    some = np.random.default_rng(6).standard_normal((5, 4))
+    assert _grams([some, np.zeros((0, 4))], 2) == pytest.approx(_grams([some], 2))
