@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import thinned
-from camcomp.diagnosis.fit.floor import REPEATABILITY_MM
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.noise_model import effective_rows
 from camcomp.diagnosis.statistics.periods import SpectralLine, screws

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from camcomp.diagnosis.fit.floor import HEALTHY
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.model.noise import HEALTHY
 from camcomp.diagnosis.result.types import MinorEffect, Outlier
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate

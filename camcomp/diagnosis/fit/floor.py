@@ -12,17 +12,15 @@ from typing import Literal
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
-from camcomp.diagnosis.model.noise import resolution_of, rounding_noise
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM, resolution_of, rounding_noise
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.seams import missing_rows
 
 CLIPPED = 6.0  # robust deviations beyond which a difference of rows is no noise
 LEAST_ROWS = 10  # of a run with a program, for an estimate of its noise
-REPEATABILITY_MM = 0.001  # of a run, per axis, where nothing is stated (contract, section 5)
 GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effect that the library lacks
 MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause, whatever its significance (contract, section 6)
 LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
-HEALTHY = 0.08  # of the noise floor at the tip: what of every effect is within tolerance
 STRETCH, LEAST_STRETCHES = 16, 8  # differences of rows that make a stretch, and stretches that tell a quiet one
 LOWER_QUARTILE = 0.82  # of the scatter of such stretches of white noise, in units of the noise (4000 draws: 0.816)
 UNSTEADY = 1.5  # times the quiet stretches: of 4000 draws of 160 rows of white noise none had it

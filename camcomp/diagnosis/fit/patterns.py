@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from camcomp.diagnosis.fit.floor import REPEATABILITY_MM
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion
