@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from camcomp.diagnosis.model.classes import EQUAL_LOG_ODDS
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
 MOST_JUMPS = 3

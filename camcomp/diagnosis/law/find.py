@@ -19,7 +19,7 @@ from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, White, gains,
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.screen import Screen, TermGrid
 from camcomp.diagnosis.law.shapes import Shapes
-from camcomp.diagnosis.model.classes import EQUAL_LOG_ODDS
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
 MOST_TERMS = 6

@@ -16,7 +16,7 @@ from camcomp.diagnosis.law.folds import Folds, gains, withheld
 from camcomp.diagnosis.law.forms import SmoothForm
 from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.law.sizes import Sizes
-from camcomp.diagnosis.model.classes import EQUAL_LOG_ODDS
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 
 ALONG, BOTH = 12, 6  # splines over one covariate, and over each of two
 WIDTHS_MM = (0.01, 0.03, 0.1)  # of the coefficients at the tip, standard deviation before any data
