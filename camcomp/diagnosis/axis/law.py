@@ -27,8 +27,7 @@ from camcomp.diagnosis.axis.block_least_squares import (
 from camcomp.diagnosis.axis.findings import AxisChannel
 from camcomp.diagnosis.axis.gate import MINOR
 from camcomp.diagnosis.axis.terms import AxisTravel, ripple
-from camcomp.diagnosis.law.forms import Form, at_drive
-from camcomp.diagnosis.law.sizes import sizes
+from camcomp.diagnosis.law.forms import Form, at_drive, sizes
 from camcomp.diagnosis.law.words import law_sentence, law_sum
 from camcomp.diagnosis.result.types import Law, LawPart, LawTerm, six_digits
 from camcomp.ground.datatypes import Floats

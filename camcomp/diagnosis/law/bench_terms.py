@@ -10,8 +10,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, means, thinned
 from camcomp.diagnosis.law.folds import White
-from camcomp.diagnosis.law.forms import Form, SmoothForm
-from camcomp.diagnosis.law.sizes import Sizes, sizes
+from camcomp.diagnosis.law.forms import Form, Sizes, SmoothForm, sizes
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.effect import Load

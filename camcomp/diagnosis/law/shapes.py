@@ -12,7 +12,7 @@ from camcomp.diagnosis.law.folds import Folds, White, gains
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.ground.datatypes import Floats
 
-INSTANTS, TURNS = 60, 2  # moments between rows that are tried for a beginning and for an end, and how often in turn
+INSTANTS = 60  # moments between rows that are tried for a beginning and for an end, twice in turn
 PHASES = 6  # of a turn between the first row and the last, by which swings that are tried differ
 MOST_APART = 500  # such steps to both sides: runs that are days apart do not count turns
 
@@ -70,7 +70,7 @@ class Shapes:
     def _between_rows(self, step: Folds, spot: Spot, best: Form) -> Form:
         """What begins or ends does so between two rows: the density is a staircase there, on which a simplex stops anywhere."""
         between = self._between(spot)
-        for _ in range(TURNS):
+        for _ in range(2):
             for i in range(len(best.shape)):
                 instants = np.cumsum(best.shape)
                 near = between[np.argsort(np.abs(between - instants[i]))[:INSTANTS]]

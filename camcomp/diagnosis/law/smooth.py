@@ -13,12 +13,11 @@ import numpy as np
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, spots
 from camcomp.diagnosis.law.find import FoundLaw, fitted
 from camcomp.diagnosis.law.folds import Folds, gains, withheld
-from camcomp.diagnosis.law.forms import SmoothForm
+from camcomp.diagnosis.law.forms import Sizes, SmoothForm
 from camcomp.diagnosis.law.shapes import Shapes
-from camcomp.diagnosis.law.sizes import Sizes
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 
-ALONG, BOTH = 12, 6  # splines over one covariate, and over each of two
+BOTH = 6  # splines over each of two covariates; twice as many over a single one
 WIDTHS_MM = (0.01, 0.03, 0.1)  # of the coefficients at the tip, standard deviation before any data
 _SINGLE = ("heading_rad", "temp_C", "cut_min", "fx_N", "fy_N", "fz_N")
 
@@ -34,7 +33,7 @@ def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundLaw | None:
         for spot in [s for s in where if all(s != each.spot for each in chosen)]:
             size = bench.sizes(spot)
             for names in _covariates(spot, size):
-                counts = (ALONG,) if len(names) == 1 else (BOTH, BOTH)
+                counts = (2 * BOTH,) if len(names) == 1 else (BOTH, BOTH)
                 form = SmoothForm(about=names, limits=tuple(size.limits[n] for n in names), counts=counts, width=1.0)
                 G, h = step.together([shapes.columns(Term(spot, form))[0]])
                 for width in WIDTHS_MM:

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from camcomp.diagnosis.law.words import listed
-from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
+from camcomp.diagnosis.model.classes import INDISTINGUISHABLE, MOST_SETS
 from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.report.plot import brief
 
-MAX_SENTENCES = 3  # rival sets with a sentence of their own
 ONLY_NOISE = "nothing but noise"  # the name of an empty set of causes
 _WHAT = {
     "tip": ("the tip is", 1e3, "µm"),
@@ -36,9 +35,9 @@ def with_outcomes(proposal: Proposal, names: Sequence[str]) -> Proposal:
         ]
     elif proposal.candidate.knows:
         [(effect, *_)] = proposal.candidate.knows
-        sentences = [_by_hand(name, effect) for name in names[:MAX_SENTENCES]]
+        sentences = [_by_hand(name, effect) for name in names[:MOST_SETS]]
     else:
-        sentences = [_by_log(proposal, names, i) for i in range(min(len(names), MAX_SENTENCES))]
+        sentences = [_by_log(proposal, names, i) for i in range(min(len(names), MOST_SETS))]
     if len(names) > 1:
         sentences.append(NEITHER)
     return replace(proposal, outcomes=tuple(sentences), rivals=tuple(names))
@@ -59,14 +58,14 @@ def _by_log(proposal: Proposal, names: Sequence[str], i: int) -> str:
     off = f"If it is {names[i]}, {what} off by {brief(scale * float(found.shows[i]), 2)} {unit} (rms) on it"
     others = [j for j in range(len(names)) if j != i]
     if alike := [names[j] for j in others if found.apart[i, j] < INDISTINGUISHABLE]:
-        return f"{off}; {listed(alike[:MAX_SENTENCES])} would look the same there."
+        return f"{off}; {listed(alike[:MOST_SETS])} would look the same there."
     left, nearest = min((float(found.left[i, j]), j) for j in others)
     return f"{off}, of which {names[nearest]} cannot explain {brief(scale * left, 2)} {unit}."
 
 
 def after_unknown(varies: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:
     """Outcomes for an unknown effect; varies: changed covariates, others: unchanged covariates of the residual."""
-    changed, stays = " and ".join(varies), " or ".join(others[:MAX_SENTENCES])
+    changed, stays = " and ".join(varies), " or ".join(others[:MOST_SETS])
     return (
         f"If what is left changes, it goes with {changed}.",
         f"If it stays as it is, it does not go with {changed}" + (f" but with {stays}." if stays else "."),

@@ -9,9 +9,7 @@ from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.report.plot import brief, micrometres
 
 SURE = 0.95  # probability from which it is not printed
-HALF = 0.5  # of the residual: covariates with a smaller share are printed only if none has a larger one
 MOST_CAUSES = 3  # causes printed on the terminal
-MAX_CAUSES_WITH_LAW = 1  # causes printed together with a law
 MOST_LINES = 10  # lines on the terminal; outcomes beyond them are on the page only
 
 
@@ -51,7 +49,7 @@ def verdict_text(result: DiagnosisResult) -> str:
     subject = "The rest" if known else "It"
     rest = f" {listed(known)} {'are' if len(known) > 1 else 'is'} identified." if known else ""
     rest += f" {listed(maybe[:MOST_CAUSES])} may be a part of it." if maybe else ""
-    drivers = [depends(each) for each in result.where.drivers if each.share >= HALF][:2] or [
+    drivers = [depends(each) for each in result.where.drivers if each.share >= EVEN][:2] or [
         depends(each) for each in result.where.drivers[:1]
     ]
     unknown = next((each for each in result.causes if each.effect == UNKNOWN), None)
@@ -95,7 +93,7 @@ def law_lines(law: Law) -> list[str]:
 def answer_lines(result: DiagnosisResult) -> list[str]:
     """The result in at most ten lines: verdict, causes with sizes and remedies, next experiment."""
     lines = [f"{result.verdict}: {verdict_text(result)}"]
-    told = by_share(result)[: MAX_CAUSES_WITH_LAW if result.law else MOST_CAUSES]
+    told = by_share(result)[: 1 if result.law else MOST_CAUSES]
     for cause in told:
         size = f"; {found}" if (found := sizes(cause)) else ""
         share = f"{percent(cause.share)} of the gap{probability_text(cause.probability)}"
