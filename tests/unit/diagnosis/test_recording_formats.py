@@ -4,7 +4,7 @@ import json
 import logging
 import math
 import sys
-from datetime import datetime
+from datetime import datetime, time
 
 import numpy as np
 import pytest
@@ -210,6 +210,14 @@ def test_xlsx(tmp_path, capsys):
     workbook(tmp_path / "bad.xlsx", [[], head, [stamps[0], *row], [stamps[1], "n.a.", *row[1:]]])
     got = imported(capsys, tmp_path / "y", tmp_path / "bad.xlsx")
     assert got.code == 2 and "bad.xlsx:4:2: error[CC422]: 'n.a.' in column shoulder_pan [deg]" in got.told
+
+
+def test_times_of_day_in_a_workbook_are_times(tmp_path, capsys):
+    rows = [[time(12, 0, second), 0.1 * second, *[0] * 5, 100.0, 200.0, 300.0] for second in (0, 20, 50)]
+    workbook(tmp_path / "poses.xlsx", [["Time", *JOINTS, "X", "Y", "Z"], *rows])
+    got = imported(capsys, tmp_path / "x", tmp_path / "poses.xlsx")
+    assert got.code == 0, got.told
+    assert list(got.logs["poses"]["t_s"]) == [0, 20, 50]
 
 
 def scope(mark="\t", comma=",", shared=False, file_time=False, last="EOF\r\n"):
