@@ -17,7 +17,6 @@ from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.answer.stretch import with_stretches
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
-from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.gap import floor_um, gap_of, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
@@ -26,6 +25,8 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.answer import LawAnswer, answer_law
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.model.calibration import calibration_of
+from camcomp.diagnosis.model.classes import MOST_SETS
+from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.next_experiment.designed import explore, propose
 from camcomp.diagnosis.next_experiment.outcomes import ONLY_NOISE, with_outcomes
 from camcomp.diagnosis.next_experiment.proposal import Proposal
@@ -61,7 +62,6 @@ from camcomp.model.motion.twin import Twin
 
 ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
 EXCLUDED = 0.02  # probability of a set of causes, below which no experiment need test it
-MOST_ALTERNATIVES = 4  # sets that are listed (contract, section 6)
 UNLOGGED_RISE = (0.3, 3.0)  # times the 10 K that are taken where no temperature is logged: by how much drives warm up
 RIVALS = 8  # sets that one experiment is asked to tell from the answer
 
@@ -273,7 +273,7 @@ def _heat_logged(problem: Problem) -> bool:
 
 def _alternatives(problem: Problem, found: CauseSearch) -> tuple[tuple[NamedCause, ...], ...]:
     rivals = sorted(found.verdict.rivals, key=lambda j: -found.probability[j])
-    sets = [found.fits[j] for j in (found.verdict.best, *rivals[: MOST_ALTERNATIVES - 1])]
+    sets = [found.fits[j] for j in (found.verdict.best, *rivals[: MOST_SETS - 1])]
     named = tuple(tuple(_named(problem, i) for i in f.members) for f in sets)
     return named if rivals else (*named, (NamedCause(effect=UNKNOWN, target=None),))
 

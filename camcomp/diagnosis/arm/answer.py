@@ -24,6 +24,7 @@ from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.folds import without_nuisances
 from camcomp.diagnosis.model.group import split_regions
+from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.model.verdict import VerdictInputs, decide
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
@@ -43,17 +44,15 @@ from camcomp.diagnosis.result.types import (
     Where,
     six_digits,
 )
-from camcomp.diagnosis.statistics.probability import EVEN
+from camcomp.diagnosis.statistics.places import FALSE
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
 from camcomp.ground.datatypes import Floats
 
-MINOR = 0.3  # of the floor: an effect that moves the tip less is no cause
 MIN_LISTED_FLOORS = 0.01  # of the floor: an effect that moves the tip less is not listed
 PLACES = 8  # parts of the workspace
 REPEATS = 20  # poses to be visited again: a floor known to a sixth
 STRETCHES = 16  # of a campaign's time
 SHORTEST = 12  # poses in a stretch
-FALSE = 0.01  # of the stretches and places that are named
-CLEAR = 3.0  # log evidence from which on the gap depends on a covariate: odds of 20
 MOST_DRIVERS = 6  # that are listed
 POSES_MAP, UNKNOWN_MAP = "poses", "poses beside unknown"  # kinds of log of the calibration
 
@@ -305,7 +304,7 @@ def drivers(told: AnswerInputs, intervals: Sequence[IntervalShare]) -> tuple[Dri
             gains[b.scales[-1][0]] = gain, b
     if not gains:
         return ()
-    clear = {name for name, (gain, _) in gains.items() if gain > CLEAR}
+    clear = {name for name, (gain, _) in gains.items() if gain > EQUAL_LOG_ODDS}
     clear |= {name for name, _ in found.background.scales}
     if not clear and intervals:
         return (Driver(covariate="time", share=round(min(sum(i.share for i in intervals), 1.0), 4)),)

@@ -16,7 +16,7 @@ from camcomp.diagnosis.arm.curves import covered, seen_angles
 from camcomp.diagnosis.arm.noise_floor import far_off
 from camcomp.diagnosis.arm.poses import CURVE, ArmBench
 from camcomp.diagnosis.model.evidence import Background
-from camcomp.diagnosis.model.folds import Excess, HeldOut, excess_of, folds_of, held_out, without_nuisances
+from camcomp.diagnosis.model.folds import ABOVE, Excess, HeldOut, excess_of, folds_of, held_out, without_nuisances
 from camcomp.diagnosis.model.group import split_regions
 from camcomp.diagnosis.model.search import MOST, search_sets
 from camcomp.diagnosis.result.types import FoundCause, ShrinkageStep, UnknownCause, UnseenShrinkage
@@ -25,7 +25,6 @@ from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 
-ABOVE = 1.25  # of the floor's square: instruments know themselves to an eighth
 LEVEL = 1.5  # of the floor's square that unseen poses stay below where they are at the floor
 SURELY, LIKELY = 2.33, 1.64  # standard errors: 99 % and 95 %, one side
 FAR_FRAME = 5.0  # contract: floors from which on withheld poses in fitted frames are warned of

@@ -16,13 +16,14 @@ import numpy as np
 
 from camcomp.diagnosis.axis.channel_data import HEALTHY_SHARE, ChannelData, Sizes
 from camcomp.diagnosis.axis.effect_columns import AxisCause
-from camcomp.diagnosis.axis.gate import KNOWN, MINOR
+from camcomp.diagnosis.axis.gate import KNOWN
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
 from camcomp.diagnosis.model.discrepancy import covariate_columns, gains_of_more, smooth_functions
 from camcomp.diagnosis.model.evidence import Background, LinearModel
 from camcomp.diagnosis.model.explain import Explanation, posterior_of
 from camcomp.diagnosis.model.group import Group
+from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.model.search import search_sets
 from camcomp.diagnosis.result.types import Estimate, FoundCause
 from camcomp.ground.datatypes import Floats

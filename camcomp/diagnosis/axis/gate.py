@@ -10,18 +10,17 @@ import numpy as np
 from scipy.stats import chi2, norm
 from scipy.stats import t as student
 
+from camcomp.diagnosis.model.folds import ABOVE
+from camcomp.diagnosis.statistics.noise_model import BLOCK
+from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.ground.datatypes import Floats
 
-MINOR = 0.3  # of the floor: what is smaller is no unknown, however sure it is
-ABOVE = 1.25  # of the floor's square: rows do not tell it to better than an eighth
 LOCAL = 2.0  # of the floor's square, that a stretch has to show: as much again as the floor
 GOING_ON = 0.5  # of the floor's square, that rows behind each other have to share in a stretch: half of what LOCAL asks for beyond it
 LEVEL = 1.5  # of the floor's square that a leftover has to stay below to be the floor
-BLOCK = 8  # rows
 MEDIAN = 0.9065  # of the variance of eight rows of white noise over its mean (chi-square of seven)
 STRETCHES = 25  # of all runs, in which the size of a leftover is looked at
 STRETCH_S = 0.5  # in which a leftover is looked for
-FALSE = 0.01  # of the stretches that are named
 LEAST_STRETCHES = 8  # of which one can stand out
 LEAST_ROWS = 20  # of a stretch
 WITHIN = 0.5  # rows: force and motion of one row are not known to be of one instant to better than that

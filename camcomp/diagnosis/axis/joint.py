@@ -23,9 +23,10 @@ from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel, 
 from camcomp.diagnosis.axis.disturbance_window import Window, find_window, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
 from camcomp.diagnosis.axis.findings import FAR, FIRST_MOVE_MM, ROWS, AxisChannel, AxisFindings, AxisRun
-from camcomp.diagnosis.axis.gate import MINOR, WITHIN, judge, not_known
+from camcomp.diagnosis.axis.gate import WITHIN, judge, not_known
 from camcomp.diagnosis.axis.terms import AxisTravel, ripple, travel
 from camcomp.diagnosis.law.words import law_sum
+from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.result.types import LawPart
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats

@@ -25,10 +25,10 @@ from camcomp.diagnosis.axis.block_least_squares import (
     withheld,
 )
 from camcomp.diagnosis.axis.findings import AxisChannel
-from camcomp.diagnosis.axis.gate import MINOR
 from camcomp.diagnosis.axis.terms import AxisTravel, ripple
 from camcomp.diagnosis.law.forms import Form, at_drive, sizes
 from camcomp.diagnosis.law.words import law_sentence, law_sum
+from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.result.types import Law, LawPart, LawTerm, six_digits
 from camcomp.ground.datatypes import Floats
 from camcomp.model.law.covariates import REFERENCE_C

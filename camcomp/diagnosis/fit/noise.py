@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
-from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, row_scatter
+from camcomp.diagnosis.fit.floor import NoiseFloor, row_scatter
 from camcomp.diagnosis.fit.starts import unknown_starts
-from camcomp.diagnosis.model.noise import rounding_noise
+from camcomp.diagnosis.model.noise import MINOR, rounding_noise
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
 

@@ -16,7 +16,7 @@ from camcomp.diagnosis.fit.columns import (
     patterns,
     shape_default,
 )
-from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, least_noise, measure_floor
+from camcomp.diagnosis.fit.floor import NoiseFloor, least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, reduced_residual, settled_interval
 from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
@@ -24,6 +24,7 @@ from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certai
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
 from camcomp.diagnosis.statistics.cause_sets import total
 from camcomp.diagnosis.statistics.evidence import estimate

@@ -8,12 +8,13 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, cause_of, step_of
 from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
-from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor
+from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
 from camcomp.diagnosis.fit.noise import less_certain_drives
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.ringing import FOLLOWED, loudest
 from camcomp.diagnosis.fit.small_forces import pushed_farther, small_forces
+from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram

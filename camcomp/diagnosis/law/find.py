@@ -13,12 +13,12 @@ from itertools import combinations
 
 import numpy as np
 
-from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench
 from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, White, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.screen import Screen, TermGrid
 from camcomp.diagnosis.law.shapes import Shapes
+from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 

@@ -15,6 +15,7 @@ from camcomp.diagnosis.model.evidence import Background, LinearModel, Members
 from camcomp.diagnosis.model.group import SmoothProcess, split_regions
 from camcomp.ground.datatypes import Floats
 
+ABOVE = 1.25  # of the floor's square: instruments know themselves to an eighth
 REGIONS = 16  # of positions or time, between which squares are compared
 
 

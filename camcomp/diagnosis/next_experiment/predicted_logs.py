@@ -11,11 +11,11 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import build
-from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.noise import inflation
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import LARGE
+from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.site import CHANNELS, STRETCH
 from camcomp.diagnosis.search.indistinguishable import HIDDEN

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.discrepancy import gains_at_scales
+from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.search.unknown import joint_products
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, parts_of
 from camcomp.diagnosis.statistics.evidence import base, holding_back, log_bayes

@@ -16,6 +16,7 @@ from scipy.special import log_ndtr, ndtri
 
 from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.floor import row_scatter
+from camcomp.diagnosis.fit.outliers import TINY
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
@@ -25,7 +26,6 @@ from camcomp.ground.datatypes import Bools, Floats
 
 KINDS = ("tip", "encoder", "drive", "dyno")
 SURE_Z = 5.0  # standard deviations of chance
-TINY = 1e-12  # mm2, below which no noise is
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 
 from camcomp.ground.datatypes import Floats, Ints
 
-_FALSE = 0.01
+FALSE = 0.01  # share of discoveries that are none
 _BIN_S = 0.4
 _CLOSE_MM = 3.0  # behind a reversal
 
@@ -72,7 +72,7 @@ def discoveries(chances: Sequence[float]) -> list[bool]:
     """Benjamini-Hochberg."""
     order = np.argsort(chances)
     n = len(order)
-    passed = [i for i, k in enumerate(order) if chances[k] <= _FALSE * (i + 1) / n]
+    passed = [i for i, k in enumerate(order) if chances[k] <= FALSE * (i + 1) / n]
     last = max(passed) if passed else -1
     out = [False] * n
     for i in order[: last + 1]:
