@@ -7,7 +7,7 @@ need a hundredth of their size, so low polynomials do where corrections need til
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -37,6 +37,7 @@ class TipField:
 
     def __init__(self, job: Job) -> None:
         self._job, self.inputs = job, uncertain_jobs(job)
+        self._machine = replace(job.real_machine, answers=None)  # exact: differences of its tips are looked at
         self._moves = 6 * len(self.inputs)  # columns of slopes and bends
         self._on_force = any(each.moves_force for each in self.inputs)
         self._fit: _Fit | None = None
@@ -125,7 +126,7 @@ class TipField:
         """Slopes, bends and, where forces are uncertain, compliances (n, 6 k + 9), solved one by one."""
         told, force = self._job.frame.to_machine(points[:, :3]), points[:, 3:]
         n = len(points)
-        base = self._tips(self._job.real_machine, told, force, "")
+        base = self._tips(self._machine, told, force, "")
         slope, bend = np.zeros((2, n, 3, len(self.inputs)))
         for j, each in enumerate(self.inputs):
             if not each.moves_machine:
@@ -137,8 +138,8 @@ class TipField:
         if self._on_force:
             push = TRIAL_FORCE_N + 0.01 * float(np.abs(force).max(initial=0.0))
             columns = [
-                (self._tips(self._job.real_machine, told, force + push * axis, "")
-                 - self._tips(self._job.real_machine, told, force - push * axis, "")) / (2.0 * push)
+                (self._tips(self._machine, told, force + push * axis, "")
+                 - self._tips(self._machine, told, force - push * axis, "")) / (2.0 * push)
                 for axis in np.eye(3)
             ]  # fmt: skip
             parts.append(np.stack(columns, axis=2).reshape(n, 9))

@@ -1,4 +1,7 @@
-"""A run of linear moves corrected by interpolation, as compensate.py corrects it exactly, and written."""
+"""A run of linear moves corrected by interpolation, as compensate.py corrects it exactly, and written.
+
+Where every number of the config is exact; runs of other programs are corrected by compensate.py.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.compensation.bands.outcome import Bands, BandTotals
-from camcomp.compensation.bands.scatter import best_share, excess
 from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import follow
 from camcomp.compensation.long.linear_run import LinearRun, NotInPieces, Unsolved
 from camcomp.compensation.long.loads import Loads, RunContext, joints_at, loads_of
 from camcomp.compensation.long.output_state import OutputState
-from camcomp.compensation.long.run_bands import RunUncertainty
 from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
 from camcomp.compensation.program.moves import chord_budget
-from camcomp.compensation.program.policy import left_alone
 from camcomp.compensation.program.under_control import apart_pays, merging, rests_of, rounds
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.linear_rows import MAX_ROW_BYTES, write_rows
@@ -79,14 +78,7 @@ class CorrectedRun:
     feed: Floats  # (N,) mm/min in force
     rest: Bools  # (N,) ends at rest because of a joining line
     seen: Ints  # (k,) rows of before and after
-    bands: Bands | None = None
-    left: Floats | None = None  # (k, 3) mm of `after` that a policy leaves on purpose
     apart: bool = False  # the control is kept from making one line of several
-
-    @property
-    def missed(self) -> Floats:
-        """`after` (k, 3) mm minus the errors that the policy accepts."""
-        return self.after if self.left is None else self.after - self.left
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -96,7 +88,6 @@ class Middles:
     rows: Ints  # the end point of the line
     move: Ints
     aimed: Floats  # (k, 3) mm to be commanded there, program frame
-    share: Floats  # (k,) of the correction
     answers: Answers
 
 
@@ -128,21 +119,17 @@ class LinearCorrector:
 
     def _corrected(self, context: RunContext, loads: Loads, output: OutputState) -> CorrectedRun:
         run = loads.run
-        uncertainty = RunUncertainty(self.job, context) if self.job.config.uncertain else None
-        policy = self.job.config.compensation.policy if uncertainty is not None else "full"
         self._set_up(run, loads)
-        if uncertainty is not None and policy == "skip":
-            loads = self._left_lines(run, loads, uncertainty)
         lead, trail = joints_at(loads, context.before, context.after)
         tolerance = np.full(run.motions, self.budget)
         hard = (loads.length > EASY_MM) & (run.linear.kind == LINE)
         for left in range(ROUNDS, 0, -1):
             rows = self._rows(run=run, loads=loads, lead=lead, trail=trail, hard=hard, tolerance=tolerance)
             answers = self.ask(rows.move, rows.target, rows.force)
-            commanded, kept, share = self._commanded(rows, answers, loads.motion, uncertainty, policy)
+            commanded, kept = self._commanded(rows, answers, loads.motion)
             if left == ROUNDS and self._drop_small_joints(rows, commanded, output, lead, trail):
                 continue
-            middles = self._middles(run, loads, rows, share)
+            middles = self._middles(run, loads, rows)
             told = self._halfway(commanded, output.commanded)[middles.rows] - middles.aimed
             bent = (_sizes(told) > self.budget) & ~hard[middles.move]
             if bent.any() and left > 1:
@@ -168,18 +155,10 @@ class LinearCorrector:
             tolerance = np.where(missed, tolerance * shrink, tolerance)
         begin = output.written
         output.__dict__.update(trial.__dict__)
-        meant, bands = None, None
-        if share is not None:
-            meant = self._left(judged, answers, middles, share)
-            error = error + meant
-        if uncertainty is not None:
-            bands = self._bands(
-                uncertainty, rows, answers=answers, judged=judged, error=error, written=written, share=share
-            )
         return CorrectedRun(
             data=data, run=run, rows=rows, answers=answers, commanded=commanded, written=written, after=error,
             before=self._back(np.concatenate((answers.unloaded[judged], middles.answers.unloaded))), begin=begin, feed=held,
-            rest=rest, seen=np.concatenate((np.flatnonzero(judged), middles.rows)), bands=bands, left=meant,
+            rest=rest, seen=np.concatenate((np.flatnonzero(judged), middles.rows)),
             apart=bool(output.apart),
         )  # fmt: skip
 
@@ -190,49 +169,6 @@ class LinearCorrector:
             self.field = Field(self.machine, force, self.job.frame.origin, TileFiles(self.machine))
         self.resolution = self.language.step_mm(self.job.config.control.resolution_mm, run.state.unit)
         self.budget = float(chord_budget(np.array(self.tolerance), self.resolution))
-
-    def _bands(
-        self, uncertainty: RunUncertainty, rows: LinearRows, *, answers: Answers, judged: Bools, error: Floats,
-        written: Floats, share: Floats | None,
-    ) -> Bands:  # fmt: skip
-        moves = uncertainty.moves(written, rows.move, rows.w, rows.force, rows.joining & (rows.w > 0.0))
-        left = np.zeros_like(written) if share is None else (1.0 - share)[:, None] * self._back(answers.unloaded)
-        left[judged] = error[: int(judged.sum())]
-        totals = BandTotals(uncertainty.inputs)
-        taken = np.ones(len(left)) if share is None else share
-        totals.add(left[judged], moves.take(np.flatnonzero(judged)), taken[judged])
-        return Bands(
-            before=self._back(answers.unloaded), after=left, moves=moves, share=taken,
-            known=np.ones(len(left), np.bool_), totals=totals,
-        )  # fmt: skip
-
-    def _left(self, judged: Bools, answers: Answers, middles: Middles, share: Floats) -> Floats:
-        """Errors (k, 3), program frame, that the policy leaves on purpose."""
-        ends = (1.0 - share[judged])[:, None] * answers.unloaded[judged]
-        between = (1.0 - middles.share)[:, None] * middles.answers.unloaded
-        return self._back(np.concatenate((ends, between)))
-
-    def _left_lines(self, run: LinearRun, loads: Loads, uncertainty: RunUncertainty) -> Loads:
-        """Add load jumps where uncorrected lines meet corrected ones; mark the uncorrected lines for `_commanded`."""
-        n, linear = run.motions, run.linear
-        fresh = loads.jump[:-1].copy()  # the other lines begin as the line before ends
-        fresh[0] = True
-        fresh[1:] |= (linear.start[1:] != linear.end[:-1]).any(axis=1)
-        at = np.flatnonzero(fresh)
-        moves, w = np.concatenate((at, np.arange(n))), np.repeat([0.0, 1.0], (len(at), n))
-        order = np.lexsort((w, moves))
-        moves, w = moves[order], w[order]
-        ends = w == 1.0
-        target = np.where(ends[:, None], linear.end[moves], linear.start[moves])
-        force = np.where(ends[:, None], loads.last[moves], loads.first[moves])
-        answers = self.ask(moves, target, force, every=False)
-        there = uncertainty.moves(
-            target + self._back(answers.correction), moves, w, force, np.zeros(len(moves), np.bool_)
-        )
-        found, behind = excess(self._back(answers.unloaded), there), np.flatnonzero(ends)
-        self._alone = left_alone(np.tile(loads.motion, 2), np.concatenate((found[behind - 1], found[behind])))[:n]
-        step = np.concatenate(([True], self._alone[1:] != self._alone[:-1], [True]))
-        return replace(loads, jump=loads.jump | step)
 
     # --- rows ----------------------------------------------------------------------------------------------------
 
@@ -318,28 +254,15 @@ class LinearCorrector:
             tiles=known.tiles,
         )  # fmt: skip
 
-    def _commanded(
-        self, rows: LinearRows, answers: Answers, of: Ints, uncertainty: RunUncertainty | None, policy: str
-    ) -> tuple[Floats, Bools, Floats | None]:
-        """Tips (N, 3) to be commanded, which rows (N,) stay as programmed, and the share (N,) of the correction, None: all of it.
-
-        What would be rounded away is left out.
-        """
-        moved, share = self._back(answers.correction), None
-        if uncertainty is not None and policy == "shrink":
-            free = rows.joining & (rows.w > 0.0)
-            moves = uncertainty.moves(rows.target + moved, rows.move, rows.w, rows.force, free)
-            share = best_share(self._back(answers.unloaded), np.zeros_like(moved), moves)
-        elif uncertainty is not None and policy == "skip":
-            behind = np.minimum(rows.move + (rows.joining & (rows.w > 0.0)), len(self._alone) - 1)
-            share = np.where(self._alone[behind], 0.0, 1.0)
-        moved = moved + rows.shift if share is None else share[:, None] * (moved + rows.shift)
+    def _commanded(self, rows: LinearRows, answers: Answers, of: Ints) -> tuple[Floats, Bools]:
+        """Tips (N, 3) to be commanded, and which rows (N,) stay as programmed: what would be rounded away is left out."""
+        moved = self._back(answers.correction) + rows.shift
         single = ~rows.joining
         motion = of[rows.move]
         single[1:] &= motion[1:] != motion[:-1]
         single[:-1] &= motion[:-1] != motion[1:]
         kept = single & (np.abs(moved).max(axis=1) <= 0.5 * self.resolution)
-        return rows.target + np.where(kept[:, None], 0.0, moved), kept, share
+        return rows.target + np.where(kept[:, None], 0.0, moved), kept
 
     def off(self, done: CorrectedRun) -> Floats:
         """Written command minus exact command of the full correction (N, 3) mm, machine frame."""
@@ -379,7 +302,7 @@ class LinearCorrector:
 
     # --- middles of lines ----------------------------------------------------------------------------------------
 
-    def _middles(self, run: LinearRun, loads: Loads, rows: LinearRows, share: Floats | None) -> Middles:
+    def _middles(self, run: LinearRun, loads: Loads, rows: LinearRows) -> Middles:
         """The middles of the lines that cut."""
         at = np.flatnonzero(self._judged(run, rows) & (loads.length[rows.move] > 0.0))
         move, w = rows.move[at], rows.w[at]
@@ -388,11 +311,7 @@ class LinearCorrector:
         start = run.linear.start[move]
         target = start + middle[:, None] * (run.linear.end[move] - start)
         answers = self.ask(move, target, loads.at(move, middle), every=False)
-        taken = np.ones(len(at))
-        if share is not None:
-            taken = 0.5 * (share[at] + share[np.maximum(at - 1, 0)])
-        aimed = target + taken[:, None] * self._back(answers.correction)
-        return Middles(rows=at, move=move, aimed=aimed, share=taken, answers=answers)
+        return Middles(rows=at, move=move, aimed=target + self._back(answers.correction), answers=answers)
 
     def _halfway(self, ends: Floats, first: Floats) -> Floats:
         return 0.5 * (ends + np.concatenate((first[None], ends[:-1])))

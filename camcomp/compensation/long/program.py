@@ -1,8 +1,8 @@
 """Long programs: read, corrected and written piece by piece, in constant memory.
 
-Runs of linear moves are corrected by interpolation between exact solutions (field.py); what stands between them goes,
-with the lines next to it, through the exact way (compensate.py). At the end a random sample of the interpolated rows is
-solved exactly, and the largest difference is part of the result.
+Runs of linear moves are corrected by interpolation between exact solutions (field.py). What stands between them, and
+all of a program whose machine file states uncertain numbers, is corrected with the lines next to it by compensate.py. At the end a random sample of the interpolated rows is solved exactly, and the largest difference is
+part of the result.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
+from camcomp.compensation.long.answers import with_answers
 from camcomp.compensation.long.engagement import RunEngagement
 from camcomp.compensation.long.linear_corrector import LinearCorrector
 from camcomp.compensation.long.linear_run import LinearRun, NotInPieces, Unsolved
@@ -75,6 +76,7 @@ class LongProgram:
         self.totals = TotalsOfPieces(
             self.job, self.name, tolerance_um=self.tolerance_um, tabled=self.on_rows is not None
         )
+        self._pointwise = with_answers(self.job) if self.job.config.uncertain else self.job
         self._sample = Sample(digest.hexdigest(), size)
         self._lines = max(lines, 1)
         self.totals.lines_in = lines
@@ -93,7 +95,7 @@ class LongProgram:
             self._told.result()
         totals = self.totals
         totals.finish(self._runs, [] if self._stock is None else self._stock.finish())
-        totals.interpolated, iterations = self._sample.proof(self._corrector, totals.points)
+        totals.interpolated, iterations = self._sample.proof(self._corrector, totals.points, self._pointwise)
         totals.iterations = max(totals.iterations, iterations)
         return totals
 
@@ -143,7 +145,7 @@ class LongProgram:
         return data[:at] + stamp + data[at:]
 
     def _corrected(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
-        if isinstance(piece.run, LinearRun):
+        if isinstance(piece.run, LinearRun) and not self.job.config.uncertain:
             return self._linear(piece.run, piece, before, after)
         return self._exactly(piece, before, after)
 
@@ -206,13 +208,20 @@ class LongProgram:
         here = row0 / self._lines
         with part_of_work(here, here):
             result = compensate(
-                program, self.job, method="newton", tolerance_um=self.tolerance_um, version=self.version, part=part,
+                program, self._pointwise, method="newton", tolerance_um=self.tolerance_um, version=self.version, part=part,
                 arcs=self.arcs, engaged=None if engaged is None else Engaged.joined(engaged.parts(0, first, len(program.path) - 1)),
             )  # fmt: skip
         own = (result.rows.motion >= part.first) & (result.rows.motion < part.last)
         assert result.written.behind is not None
         self._output.take(result.written.behind, result.rows.end[np.flatnonzero(own)[-1]])
-        self._tell(lambda: self.totals.add_piece(result, own, part))
+
+        def tell() -> JointTableRows:
+            rows = self.totals.add_piece(result, own, part)
+            if self._pointwise is not self.job:
+                self._sample.add_points(self.job, rows, result.rows.corrected[own])
+            return rows
+
+        self._tell(tell)
         return result.written.data[len(head) : len(result.written.data) - len(tail)]
 
 

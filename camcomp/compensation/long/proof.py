@@ -7,7 +7,8 @@ import numpy as np
 from camcomp.compensation.long.linear_corrector import CorrectedRun, LinearCorrector
 from camcomp.compensation.program.result import Interpolation
 from camcomp.compensation.program.totals import JointTableRows
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
+from camcomp.model.job import Job
 from camcomp.model.statics.target import correct, settle
 
 MOST_CHECKED, CHECKED_SHARE = 1000, 0.05  # points that are solved exactly, at most and of all
@@ -20,6 +21,7 @@ class Sample:
         self._random = np.random.default_rng(int(digest[:16], 16))
         self._share = min(1.0, 3.0 * MOST_CHECKED * 24.0 / max(size, 1))  # a line has some 24 bytes
         self._rows: list[Floats] = []
+        self._points: list[Floats] = []  # of pieces on an interpolated machine: target (3), force (3), machine frame
 
     def add(self, corrector: LinearCorrector, done: CorrectedRun, rows: JointTableRows) -> None:
         """Draw some of the rows of a run."""
@@ -29,8 +31,20 @@ class Sample:
             moves = (answers.correction, answers.unloaded, rows.joints, rows.drive, corrector.off(done))
             self._rows.append(np.concatenate([each[chosen] for each in (target, rows.force, *moves)], axis=1))
 
-    def proof(self, corrector: LinearCorrector, points: int) -> tuple[Interpolation | None, int]:
-        """Differences of rows to their exact solutions, and the most iterations; points: rows of the program."""
+    def add_points(self, job: Job, rows: JointTableRows, corrected: Bools) -> None:
+        """Draw some of the corrected rows (N,) of a piece."""
+        chosen = np.flatnonzero(corrected & (self._random.random(len(rows.s)) < self._share))
+        target = job.frame.to_machine(rows.target[chosen])
+        self._points.append(np.concatenate((target, rows.force[chosen]), axis=1))
+
+    def proof(self, corrector: LinearCorrector, points: int, job: Job) -> tuple[Interpolation | None, int]:
+        """Differences of rows to their exact solutions, and the most iterations.
+
+        points: rows of the program. job: of the pieces that were not corrected as runs of linear moves.
+        """
+        if self._points:
+            target, force = np.split(np.concatenate(self._points), [3], axis=1)
+            return job.real_machine.answers.proof(target, force), 0
         if corrector.field is None or not self._rows:
             return None, 0
         machine, sample = corrector.machine, np.concatenate(self._rows)

@@ -61,11 +61,11 @@ class TotalsOfPieces(Totals):
         out = JointTableRows(
             line=linear.row[rows.move] + run.row0 + 1, s=s, t=t, target=rows.target, written=done.written,
             force=self.job.frame.vectors(rows.force), nominal=answers.nominal, joints=joints, drive=drive,
-            behind=self._behind(self._columns(done.bands), rows.engagement),
+            behind=self._behind(None, rows.engagement),
         )  # fmt: skip
         self._add(
             out, joining=rows.joining, corrected=np.ones(len(s), np.bool_), tilt=answers.rest[:, :3],
-            before=done.before, after=done.after, missed=done.missed,
+            before=done.before, after=done.after, missed=done.after,
         )  # fmt: skip
         self._linear_control(run, done)
         self._examine(path, rows.target, done.written, linear.kind[rows.move] != RAPID)
@@ -121,7 +121,7 @@ class TotalsOfPieces(Totals):
         told = np.concatenate((done.written[seen[:ends]], 0.5 * (start + done.written)[seen[ends:]]))
         joining = np.concatenate((rows.joining, [False]))
         line = linear.row[rows.move[seen]] + run.row0 + 1
-        after.add(moves, SeenPoints(seen, told, done.missed, line, joining[seen - 1] | joining[seen + 1]))
+        after.add(moves, SeenPoints(seen, told, done.after, line, joining[seen - 1] | joining[seen + 1]))
 
     def _exact_control(self, result: Compensated, own: Bools, part: Part) -> None:
         """Plan the moves of exactly corrected lines as the controller does."""
