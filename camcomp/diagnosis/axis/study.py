@@ -27,6 +27,7 @@ from camcomp.diagnosis.axis.next_moves import next_moves
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM, following_floor, rows_floor
 from camcomp.diagnosis.axis.own_unit import in_own_unit
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
+from camcomp.diagnosis.model.discrepancy import with_discrepancy
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.standards import StandardValues
 from camcomp.diagnosis.result.types import (
@@ -132,6 +133,8 @@ def _every_axis(
     ]
     for a in found:
         _nothing_below_the_floor(a)
+        if a.strange:
+            a.causes = [c.model_copy(update={"probability": with_discrepancy(c.probability)}) for c in a.causes]
     return found
 
 

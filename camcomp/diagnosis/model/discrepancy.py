@@ -18,7 +18,7 @@ from scipy.linalg import eigh
 
 from camcomp.diagnosis.model.evidence import Background, LinearModel, Members
 from camcomp.diagnosis.model.group import Group, SmoothProcess, split_regions
-from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, stated
 from camcomp.ground.datatypes import Floats
 
 ORDERS = 8  # cosines of a covariate
@@ -41,6 +41,13 @@ def covariate_columns(functions: Floats, directions: Floats) -> Floats:
     """Columns (n, c, d orders) by which functions (n, orders) act along directions (n, c, d), which are one floor long."""
     n, c, d = directions.shape
     return np.asarray(np.einsum("nk,ncd->ncdk", functions, directions).reshape(n, c, d * functions.shape[1]), float)
+
+
+def with_discrepancy(probability: float) -> float:
+    """Probability of a cause beside a discrepancy of any form that is certain: the data do not determine causes beside it, and
+    its prior probability stays.
+    """
+    return stated((1.0 - UNKNOWN) * probability)
 
 
 def prior_of_covariate(model: LinearModel) -> float:
