@@ -14,6 +14,7 @@ from camcomp.ground.datatypes import Floats
 HEALTHY_SHARE = 0.3  # of the channel's size: scale of a size that every axis has
 CLOCK, TURNING = "clock", "turning"  # kinds: rows that are late; friction while it turns round, limited by its peak
 Sizes = Mapping[str, Floats]  # kind -> columns (n, q)
+Response = Callable[[int, Sequence[tuple[AxisCause, Floats]]], Floats]  # run, causes that act -> values (n,)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -28,7 +29,7 @@ class ChannelData:
     values: Sequence[Floats]
     healthy: Sequence[Sizes]
     covariates: Sequence[Mapping[str, Floats]]
-    response: Callable[[int, Sequence[tuple[AxisCause, Floats]]], Floats]
+    response: Response
     floor: float
     train: Sequence[int]
     times: Sequence[Floats]
@@ -44,6 +45,11 @@ class ChannelData:
     def healthy_columns(self, run: int) -> Floats:
         """Columns (n, q) of healthy sizes of all kinds."""
         return np.concatenate([*self.healthy[run].values()], axis=1)
+
+    def residual_of(self, run: int, left: Sequence[Floats]) -> ChannelData:
+        """Residuals (n,) of one run beside a constant; left: of every run."""
+        one = [{"offset": np.ones((len(each), 1))} for each in left]
+        return replace(self, values=left, healthy=one, train=[run], level=0.0, clock=0.0)
 
     @property
     def scales(self) -> dict[str, Floats]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.ground.datatypes import Bools, Floats, Ints
@@ -41,8 +42,8 @@ def find_window(
 ) -> tuple[Window, Floats] | None:
     """The window of forces (n,) N that explains most, where it is a push: as large throughout as it is on average; by run.
 
-    beside: columns (n, k) that are fitted to the same runs, so that friction and inertia have no part in how long a push lasts;
-    runs without them are held out. With what all else leaves of the window's run (n,), the push still in it.
+    beside: columns (n, k) that are fitted to the same runs, so that friction and inertia have no part in how long a push lasts.
+    With what all else leaves of the window's run (n,), the push still in it.
     """
     rests, bases = _projected(values, beside)
     best: tuple[float, int, int, int] | None = None
@@ -87,18 +88,14 @@ def _projected(
     values: Mapping[int, Floats], beside: Mapping[int, Floats]
 ) -> tuple[dict[int, Floats], dict[int, Floats]]:
     """What columns and a constant per run leave of the values (n,), and an orthonormal basis (n, k) of these, by run."""
-    fitted = [k for k in values if k in beside]
-    ends = np.cumsum([len(values[k]) for k in fitted])[:-1]
-    ones = [np.ones((len(values[k]), 1)) for k in fitted]
-    A = np.concatenate([np.concatenate([beside[k] for k in fitted]), block_diag(*ones)], axis=1)
+    ends = np.cumsum([len(each) for each in values.values()])[:-1]
+    ones = [np.ones((len(each), 1)) for each in values.values()]
+    A = np.concatenate([np.concatenate([beside[k] for k in values]), block_diag(*ones)], axis=1)
     U, size, _ = np.linalg.svd(A / (np.sqrt(np.mean(A**2, axis=0)) + 1e-300), full_matrices=False)
     Q = U[:, size > 1e-9 * size[0]]
-    y = np.concatenate([values[k] for k in fitted])
-    rests = dict(zip(fitted, np.split(y - Q @ (Q.T @ y), ends), strict=True))
-    bases = dict(zip(fitted, np.split(Q, ends), strict=True))
-    for k in values:
-        if k not in beside:
-            rests[k], bases[k] = values[k] - np.mean(values[k]), np.full((len(values[k]), 1), len(values[k]) ** -0.5)
+    y = np.concatenate([*values.values()])
+    rests = dict(zip(values, np.split(y - Q @ (Q.T @ y), ends), strict=True))
+    bases = dict(zip(values, np.split(Q, ends), strict=True))
     return rests, bases
 
 
@@ -157,6 +154,12 @@ def sharp(window: Window, rest: Floats, time: Floats) -> bool:
     ends = [(window.first, -1), (window.last, 1)]
     jumps = [np.mean(_beside(rest, at, -side, reach)) - np.mean(_beside(rest, at, side, reach)) for at, side in ends]
     return all(float(jump) / window.shift > SHARP for jump in jumps)
+
+
+def rising(push: Floats, time: Floats, rise_s: float) -> Floats:
+    """What a force (n,) N in a window is not known to where it comes and goes, row by row: half of what it changes by."""
+    reach = 2 * max(round(rise_s / float(np.median(np.diff(time)))), 1) + 1
+    return np.asarray(0.5 * (maximum_filter1d(push, reach) - minimum_filter1d(push, reach)))
 
 
 def _beside(rest: Floats, at: int, side: int, reach: int) -> Floats:

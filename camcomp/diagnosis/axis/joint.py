@@ -18,9 +18,9 @@ import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.block_least_squares import by_block, gain, log10_chance, series, withheld
-from camcomp.diagnosis.axis.channel_data import TURNING, ChannelData
+from camcomp.diagnosis.axis.channel_data import TURNING, ChannelData, Response
 from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel, healthy_sizes
-from camcomp.diagnosis.axis.disturbance_window import Window, find_window, seen_elsewhere, sharp
+from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
 from camcomp.diagnosis.axis.findings import FAR, FIRST_MOVE_MM, ROWS, AxisChannel, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import WITHIN, judge, not_known
@@ -172,17 +172,16 @@ def study_channel(
         found.laws = [_written_law(found, texts, done.sizes)]
     if rows.channel == "force" and "disturbance" not in without:
         done, pushes = _with_pushes(found.name, data, terms, done, rows)
+        done = _with_pushes_where_judged(found.name, data, done, rows)
         start = {run.name: run.started for run in rows.runs}
         found.pushed = [
             (str(p.run), p.shape["from_s"] - start[str(p.run)], p.shape["to_s"] - start[str(p.run)]) for p in pushes
         ]
     found.causes += done.causes
-    if (
-        rows.channel == "behind"
-    ):  # what is left of two encoders without their zeros and clocks is an error of the machine
+    if rows.channel == "behind":  # without zeros and clocks of two encoders, the rest is an error of the machine
         apart = [sum(own[kind] @ done.sizes[kind] for kind in ("offset", "delay")) for own in data.healthy]
         rows = replace(rows, values=[each - own for each, own in zip(rows.values, apart, strict=True)])
-    channel = _channel(rows, done)
+    channel = _channel(rows, done, data.response)
     _tell(found, rows, done, data.healthy)
     if rows.channel == "force" and not rows.runs[0].revolute:
         line = ripple([rows.moves[k] for k in rows.train], [done.left[k] for k in rows.train])
@@ -328,11 +327,14 @@ def _covariates(found: AxisFindings, rows: JointRows, around: AxisSurroundings) 
 def _with_pushes(
     name: str, data: ChannelData, terms: Sequence[AxisCause], done: ChannelFit, rows: JointRows
 ) -> tuple[ChannelFit, list[AxisCause]]:
-    """The fit jointly with disturbance forces, as long as the evidence takes one more, and these."""
+    """The fit jointly with disturbance forces, as long as the evidence takes one more, and these.
+
+    data, terms: what is fitted to the runs `data.train`.
+    """
     pushes: list[AxisCause] = []
     for _ in range(CAUSES):
-        beside = {k: data.healthy_columns(k) for k in rows.train}
-        left = {k: done.left[k] for k in (*rows.train, *rows.test)}
+        beside = {k: data.healthy_columns(k) for k in data.train}
+        left = {k: done.left[k] for k in data.train}
         found = find_window(left, beside, {k: rows.moves[k].time for k in left}, data.floor)
         if found is None:
             break
@@ -345,6 +347,20 @@ def _with_pushes(
             break
         done, pushes = again, more
     return done, pushes
+
+
+def _with_pushes_where_judged(name: str, data: ChannelData, done: ChannelFit, rows: JointRows) -> ChannelFit:
+    """The fit with the disturbance forces of runs that are judged only, from the residual of each."""
+    for k in rows.test:
+        alone, pushes = _with_pushes(name, data.residual_of(k, done.left), [], done, rows)
+        if not pushes:
+            continue
+        left = [*done.left]
+        left[k] = left[k] - data.response(k, alone.acting)
+        part = float(np.sum(done.left[k] ** 2) / np.sum((data.values[k] - data.level) ** 2))
+        causes = [c.model_copy(update={"share": round(min(part * c.share, 1.0), 4)}) for c in alone.causes]
+        done = replace(done, causes=(*done.causes, *causes), acting=(*done.acting, *alone.acting), left=left)
+    return done
 
 
 def _push(name: str, window: Window, rows: JointRows) -> AxisCause:
@@ -397,10 +413,15 @@ def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, healthy: Seque
     }
 
 
-def _channel(rows: JointRows, done: ChannelFit) -> AxisChannel:
-    """Residuals of the fitted runs, and of those that are judged only, against the floor."""
+def _channel(rows: JointRows, done: ChannelFit, response: Response) -> AxisChannel:
+    """Residuals of the fitted runs, and of those that are judged only, against the floor.
+
+    Disturbance forces of runs that are judged only are no part of what shrinks there.
+    """
     moves, values, train, test = rows.moves, rows.values, rows.train, rows.test
     constant = done.sizes["offset"][0] if rows.channel == "force" else 0.0
+    pushing = [each for each in done.acting if each[0].run is not None]
+    pushed = [response(k, pushing) for k in range(len(values))]
     moving = sum(float(np.ptp(moves[k].position)) > FAR * FIRST_MOVE_MM for k in train)
     data = series([moves[k].time for k in train], [values[k] for k in train], moving)
     first = by_block(data, data.y - constant)
@@ -410,18 +431,20 @@ def _channel(rows: JointRows, done: ChannelFit) -> AxisChannel:
     channel.last = by_block(data, np.concatenate(channel.left))
     channel.columns = done.columns
     channel.whole = [(moves[k].time, values[k]) for k in train]
+    channel.held_whole = {k: values[k] - constant - pushed[k] for k in test}
     if test:
         seen = series([moves[k].time for k in test], [values[k] for k in test])
-        channel.first = by_block(seen, seen.y - constant)
+        channel.first = by_block(seen, np.concatenate([channel.held_whole[k] for k in test]))
         channel.last = by_block(seen, np.concatenate([done.left[k] for k in test]))
     channel.held = {k: done.left[k] for k in test}
-    channel.held_whole = {k: values[k] - constant for k in test}
     channel.held_times = {k: moves[k].time for k in test}
     order = [*train, *test]
     channel.names = [rows.runs[k].name for k in order]
     left = [done.left[k] for k in order]
     if rows.channel == "force":  # beside what laws of friction and inertia are known to
-        known = [np.hypot(rows.floor, not_known(values[k] - done.left[k] - constant)) for k in order]
-        left = [each * rows.floor / own for each, own in zip(left, known, strict=True)]
+        rise = shelf.load("effects", "disturbance").RISE_S
+        own = [not_known(values[k] - done.left[k] - constant) for k in order]
+        known = [np.hypot(each, rising(pushed[k], moves[k].time, rise)) for k, each in zip(order, own, strict=True)]
+        left = [each / np.hypot(1.0, by / rows.floor) for each, by in zip(left, known, strict=True)]
     channel.gate = judge(left, left, [moves[k].time for k in order], rows.floor)
     return channel
