@@ -189,6 +189,14 @@ class AxisChannel:
         """Residuals of the fitted rows; `columns` are tangents of what was fitted to them."""
         return replace(self.data, y=np.concatenate(self.left))
 
+    def followed(self, runs: Sequence[AxisRun]) -> list[Floats]:
+        """Positions (n,) of runs by the fit of a following error: encoders without what it leaves."""
+        paths = [run.encoder.copy() for run in runs]
+        fitted = {k: (m.time, left) for k, m, left in zip(self.runs, self.moves, self.left, strict=True)}
+        for k, (time, left) in {**fitted, **{k: (self.held_times[k], left) for k, left in self.held.items()}}.items():
+            paths[k][np.isin(runs[k].time, time)] += left
+        return paths
+
 
 @dataclass(eq=False, kw_only=True)
 class AxisFindings:

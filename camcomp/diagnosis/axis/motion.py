@@ -48,11 +48,12 @@ def motion_of(
     values: list[Floats],
     train: list[int],
     late: float | None,
+    followed: list[Floats] | None = None,
 ) -> tuple[list[AxisRun], list[AxisTravel], list[Floats]]:
     """What moved while a channel had its values (n,): set-points, as late as they are followed, where that explains them as well.
 
-    The noise of an encoder is in its following error, too, and would explain
-    a part of itself. With the runs and their values, where somebody saw how fast the axis was, and where it no longer matters
+    followed: positions (n,) of the axis by the fit of its following error, in place of set-points. The noise of an encoder is
+    in its following error, too, and would explain a part of itself. With the runs and their values, where somebody saw how fast the axis was, and where it no longer matters
     how it moved before its log began.
     """
     encoders = [travel(r.time, r.encoder, found.wide) for r in runs]
@@ -70,11 +71,15 @@ def motion_of(
     def misfit(moves: list[AxisTravel]) -> float:
         return _misfit(mine, told, [moves[k] for k in train])
 
-    ways = {wide: [travel(r.time, r.setpoint, wide, late) for r in runs] for wide in SETPOINT_WIDE}
-    left = {each: misfit(moves) for each, moves in ways.items()}
-    wide = next(each for each in ways if left[each] <= SAME_MISFIT * min(left.values()))
-    setpoints = ways[wide]
+    def narrowest(paths: list[Floats], behind: float) -> list[AxisTravel]:
+        ways = [[travel(r.time, x, wide, behind) for r, x in zip(runs, paths, strict=True)] for wide in SETPOINT_WIDE]
+        left = [misfit(each) for each in ways]
+        return next(each for each, own in zip(ways, left, strict=True) if own <= SAME_MISFIT * min(left))
+
+    setpoints = narrowest([r.setpoint for r in runs], late)
     by_encoder = misfit(encoders) < ENCODER_BETTER * misfit(setpoints)
+    if followed is not None and not by_encoder:
+        setpoints = narrowest(followed, 0.0)
     settled = [r.time >= r.time[0] + SETTLED * late for r in runs]
     return kept(encoders if by_encoder else setpoints, settled)
 

@@ -251,7 +251,11 @@ def _forced(found: AxisFindings, task: AxisTask, late: float | None) -> AxisFind
     if not task.train or not all(np.isfinite(task.usable[k].force).all() for k in task.train):
         return found
     found, forces = replace(found), [r.force for r in task.usable]
-    runs, moves, values = motion_of(found, task.usable, forces, task.train, late)
+    swings = any(
+        c.effect == "servo_overshoot" for c in found.causes
+    )  # set-points a while later are no motion of such a loop
+    followed = found.following.followed(task.usable) if found.following and swings else None
+    runs, moves, values = motion_of(found, task.usable, forces, task.train, late, followed=followed)
     on = [run.moved() for run in runs]
     moves = [m.of(rows) for m, rows in zip(moves, on, strict=True)]
     values = [own[rows] for own, rows in zip(values, on, strict=True)]
