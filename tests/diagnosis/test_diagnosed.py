@@ -22,6 +22,7 @@ def answer(plan, folder, *options):
     return result, made.record
 
 
+@pytest.mark.campaign  # test_answers_on_programs has one in the plain run
 def test_nothing_is_wrong(tmp_path):
     result, truth = answer(Plan(3, rapids=True, **SMALL), tmp_path)
     assert (result["verdict"], result["causes"]) == ("none", [])

@@ -18,7 +18,8 @@ MISSES = {
     ("puu", "speed_limit"): ["speed_mm_per_s 16"],
     ("kuka-kr210", "speed_limit"): ["speed_rad_per_s 0.0133"],
 }
-COST = {name: 3 for name in grid.MACHINES} | {"cartesian": 1, "orthoglide": 1, "delta": 2, "ur10": 2}  # of a diagnosis
+# How long a diagnosis takes, against the shortest.
+COST = {"orthoglide": 1, "delta": 2, "puu": 3, "cartesian": 1, "router": 2, "hexapod": 5, "kuka-kr210": 3, "ur10": 2}
 WITHOUT_A_FAULT = ("orthoglide", "cartesian", "ur10")  # parallel, slides in a row, arm
 
 

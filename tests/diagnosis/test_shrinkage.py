@@ -13,7 +13,7 @@ from tests.diagnosis.test_where import SCREW
 from tests.validation.plants.further_run import add_run
 
 
-@pytest.mark.parametrize("plan", [PAIR, pytest.param(SCREW, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("plan", [SCREW, pytest.param(PAIR, marks=pytest.mark.campaign)])
 def test_steps_lead_from_the_gap_to_near_the_floor_and_the_ceiling_is_no_worse(workshop, plan):
     result = workshop.answer(plan)[0]
     found = result["shrinkage"]

@@ -84,7 +84,9 @@ def test_a_lag_that_differs_between_the_ways_by_less_than_the_floor_is_a_lag():
     assert much.verdict == "unknown" and much.where.drivers[0].covariate == "velocity:x"
 
 
-@pytest.mark.parametrize(("pulses", "first"), [(5, "time:x"), (0, "position:x")])
+@pytest.mark.parametrize(
+    ("pulses", "first"), [(5, "time:x"), pytest.param(0, "position:x", marks=pytest.mark.campaign)]
+)
 def test_what_comes_and_goes_beside_a_ripple_is_of_time(pulses, first):
     rng = np.random.default_rng(6)
     time = 1e-3 * np.arange(24000)
