@@ -93,7 +93,7 @@ def test_robot_programs(tmp_path, name, text):
     random, ends = Random(8), set()
     tokens = re.findall(r"\w+|\s+|[^\w\s]", text)
     (tmp_path / "frames.yaml").write_text(FRAMES)
-    for _ in range(50):
+    for _ in range(30):
         changed = list(tokens)
         for _ in range(random.choice((1, 1, 2, 3))):
             changed[random.randrange(len(changed))] = random.choice((*TOKENS, random.choice(tokens), ""))

@@ -67,6 +67,7 @@ def test_a_study_of_axes_fills_the_same_keys(axis, ambiguous):
     assert told["axes_in_detail"]["x"]["force"]["mass_kg"]["ci95"][0] < 1.0
 
 
+@pytest.mark.campaign  # test_claims has one in the plain run
 def test_a_study_of_axes_with_unseen_runs_tells_how_far_the_gap_shrinks():
     runs = [axis_run(name, seed=k) for k, name in enumerate("abcd")]
     assert axis_study({"x": runs}).shrinkage.holdout == ("a", "b", "c", "d")

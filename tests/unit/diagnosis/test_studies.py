@@ -122,7 +122,8 @@ def weary(r, amplitude, seed):
     return replace(r, tip=measured(r.q, seed, error=error, **TRUTH))
 
 
-@pytest.mark.parametrize("stated", [STATED, pytest.param(StatedDeviation(), marks=pytest.mark.campaign)])
+@pytest.mark.campaign  # test_answers_on_poses has one in the plain run
+@pytest.mark.parametrize("stated", [STATED, StatedDeviation()])
 def test_what_the_library_lacks_is_unknown_and_named_by_what_it_depends_on(robot, faulty, stated):
     runs = [weary(r, 3e-4, k + 1) for k, r in enumerate(faulty)]
     result = arm_study(robot, (), runs, stated=stated)
