@@ -18,6 +18,7 @@ from camcomp.diagnosis.arm.poses import CURVE, ArmBench
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.folds import ABOVE, Excess, HeldOut, excess_of, folds_of, held_out, without_nuisances
 from camcomp.diagnosis.model.group import split_regions
+from camcomp.diagnosis.model.noise import AT_FLOOR
 from camcomp.diagnosis.model.search import MOST, search_sets
 from camcomp.diagnosis.result.types import FoundCause, ShrinkageStep, UnknownCause, UnseenShrinkage
 from camcomp.diagnosis.statistics.shrinkage import log_ratio, of_one_more, scatter
@@ -25,7 +26,6 @@ from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 
-LEVEL = 1.5  # of the floor's square that unseen poses stay below where they are at the floor
 SURELY, LIKELY = 2.33, 1.64  # standard errors: 99 % and 95 %, one side
 FAR_FRAME = 5.0  # contract: floors from which on withheld poses in fitted frames are warned of
 REGIONS = 16  # of postures of a campaign
@@ -52,7 +52,7 @@ class HeldOutCheck:
         """Whether held-out poses are at the floor; None where all campaigns are fitted."""
         if self.excess is None:
             return None
-        return self.excess.mean + LIKELY * self.excess.error < LEVEL
+        return self.excess.mean + LIKELY * self.excess.error < AT_FLOOR
 
 
 def check_held_out(case: PoseCase) -> HeldOutCheck:

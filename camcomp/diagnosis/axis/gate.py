@@ -11,13 +11,13 @@ from scipy.stats import chi2, norm
 from scipy.stats import t as student
 
 from camcomp.diagnosis.model.folds import ABOVE
+from camcomp.diagnosis.model.noise import AT_FLOOR
 from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.ground.datatypes import Floats
 
 LOCAL = 2.0  # of the floor's square, that a stretch has to show: as much again as the floor
 GOING_ON = 0.5  # of the floor's square, that rows behind each other have to share in a stretch: half of what LOCAL asks for beyond it
-LEVEL = 1.5  # of the floor's square that a leftover has to stay below to be the floor
 MEDIAN = 0.9065  # of the variance of eight rows of white noise over its mean (chi-square of seven)
 STRETCHES = 25  # of all runs, in which the size of a leftover is looked at
 STRETCH_S = 0.5  # in which a leftover is looked for
@@ -70,7 +70,7 @@ def judge(
     if found:
         return AxisGate("above", chance, found)
     high = size.mean() + float(student.ppf(0.95, freedom)) * spread
-    return AxisGate("at" if high < LEVEL else "open", 0.0, ())
+    return AxisGate("at" if high < AT_FLOOR else "open", 0.0, ())
 
 
 def energy(left: Floats, floor: float) -> float:

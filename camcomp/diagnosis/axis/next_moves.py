@@ -15,8 +15,9 @@ import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.findings import AxisFindings, AxisRun
-from camcomp.diagnosis.axis.gate import LEVEL, STRETCH_S
+from camcomp.diagnosis.axis.gate import STRETCH_S
 from camcomp.diagnosis.axis.terms import travel
+from camcomp.diagnosis.model.noise import AT_FLOOR
 from camcomp.diagnosis.next_experiment.design import SETUP_MIN
 from camcomp.diagnosis.next_experiment.proposal import PRICE, WORTH
 from camcomp.diagnosis.result.types import UNKNOWN, AxisMoves, NextExperiment, StrokeBlock
@@ -107,7 +108,7 @@ def _designed(axis: AxisFindings, logs: Sequence[AxisRun], verdict: str) -> tupl
     bins = {"position": _bins(position), "velocity": _bins(speed), "acceleration": _bins(push)}
     weight = _weights(axis, verdict)
     kinds, probability = tuple(weight), np.array([*weight.values()]) / sum(weight.values())
-    size = 1.0 if verdict == UNKNOWN else np.sqrt(LEVEL - 1.0)  # it may be no larger there than the floor
+    size = 1.0 if verdict == UNKNOWN else np.sqrt(AT_FLOOR - 1.0)  # it may be no larger there than the floor
     blank = AxisMoves(
         axis=axis.name, unit="rad" if logs[0].revolute else "mm", blocks=(), acceleration=_tidy(hardest), step_s=step
     )

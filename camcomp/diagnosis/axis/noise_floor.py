@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import median_abs_deviation
 
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.ground.datatypes import Floats
 
 STAYING = 0.1  # of the rows that do not move, from which on steps are a resolution
-REPEATABILITY_MM = 1e-3  # by which runs differ, and positions drift, unless stated otherwise
 SPIKE = 12.0  # deviations from the neighbours' median
 FAST_S = 0.005  # between rows: within two of them no drive goes out and comes back, however little
 LEAST_SPIKE_MM = 0.1  # the same between rows that are further apart: none goes so far

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM
 from camcomp.diagnosis.fit.measured import Measured
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Motion

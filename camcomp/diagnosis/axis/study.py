@@ -24,10 +24,11 @@ from camcomp.diagnosis.axis.joint import AxisSurroundings, JointRows, study_chan
 from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
 from camcomp.diagnosis.axis.next_moves import next_moves
-from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM, following_floor, rows_floor
+from camcomp.diagnosis.axis.noise_floor import following_floor, rows_floor
 from camcomp.diagnosis.axis.own_unit import in_own_unit
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.standards import StandardValues
 from camcomp.diagnosis.result.types import (

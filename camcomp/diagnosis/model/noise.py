@@ -9,6 +9,9 @@ from camcomp.ground.datatypes import Floats
 REPEATABILITY_MM = 0.001  # of a run, per axis, where nothing is stated (contract, section 5)
 HEALTHY = 0.08  # of the noise floor at the tip: what of every effect is within tolerance
 MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause, whatever its significance (contract, section 6)
+AT_FLOOR = (
+    1.5  # of the square of the noise floor: what is left on unseen rows is the floor where it is surely below that
+)
 LEAST_ROWS = 12  # distinct values from which on a resolution is determined
 
 
