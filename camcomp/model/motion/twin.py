@@ -1,7 +1,8 @@
 """The one forward model: set-points in time -> control -> drive -> structure -> tool -> workpiece -> sensor.
 
 simulate prints it, diagnose compares it with logs, compensate inverts it. signal_path.py orders the hooks of effects. The
-loaded equilibrium is solved at the nodes of a run path, and extended by its first derivatives between them.
+loaded equilibrium is solved at the nodes of a run path, and extended by its derivatives: by the first ones between them, by
+the second ones where carriages are far off.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
+from itertools import combinations_with_replacement
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -30,6 +32,8 @@ from camcomp.model.statics.masses import has_moved_mass, mass_loads
 from camcomp.model.statics.solve import FREE, STATUS, solve
 
 _RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
+_FAR = 0.3  # mm or mrad off the solution, from which on second derivatives count: 0.1 um at an arm of 400 mm
+_FAR_STEP = 1.0  # mm or mrad, for second derivatives
 _FORCE_STEP = 1.0  # N
 _MOMENT_STEP = 100.0  # N mm
 _LATELY = 4  # changed machines kept in the cache
@@ -60,6 +64,10 @@ class Twin(ControlKinematics):
         default_factory=dict, init=False, repr=False
     )
     _usual: WeakKeyDictionary[RunPath, tuple[Motion, Motion, Motion]] = field(
+        default_factory=WeakKeyDictionary, init=False, repr=False
+    )
+
+    _curved: WeakKeyDictionary[Solved, dict[tuple[int, ...], Floats]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
 
@@ -157,6 +165,7 @@ class Twin(ControlKinematics):
             tip = slopes.tips(place_tip).behind(
                 tip, place_tip, solved, gap_tip, load_tip, usual=usual, softer=tip_softer
             )
+            tip = tip + self._bent(run_path, place_tip, solved, gap_tip - solved.shift[place_tip.piece], robot)
         if effort is not None:
             drive = drive + path.between(effort, run_path.time)
         tip = self._on_workpiece(run_path, causes, tip, load=load_tip, motion=at_tip, place=place_tip)
@@ -315,6 +324,27 @@ class Twin(ControlKinematics):
             tip_rho=tip[:, :, :m], tip_wrench=tip[:, :, m:], drive_rho=drive[:, :, :m], drive_wrench=drive[:, :, m:],
             at_reference=self._at_reference(run_path), key=key,
         )  # fmt: skip
+
+    def _bent(self, run_path: RunPath, place: Places, solved: Solved, off: Floats, robot: Robot) -> Floats | float:
+        """Second-order part (n, 3) of the tips of carriages (n, m) that stand far off the solution."""
+        unit = np.array([1e-3 if a.revolute else 1.0 for a in robot.actuators])
+        far = np.flatnonzero((np.abs(off) > _FAR * unit).any(axis=0)).tolist()
+        if not far:
+            return 0.0
+        known, step = self._curved.setdefault(solved, {}), _FAR_STEP * np.diag(unit)
+
+        def moved(*ways: Floats) -> Floats:
+            shift = solved.shift + sum(ways)
+            return self.structure(run_path, self._machine(robot, solved.key), solved.key, shift, solved.load).tip
+
+        out = np.zeros((len(off), 3))
+        for j, k in combinations_with_replacement(far, 2):
+            if (j, k) not in known:
+                known[j, k] = moved(step[j], step[k]) - moved(step[j], -step[k]) - moved(-step[j], step[k])
+                known[j, k] = (known[j, k] + moved(-step[j], -step[k])) / (4.0 * step[j, j] * step[k, k])
+            times = (0.5 if j == k else 1.0) * off[:, j] * off[:, k]
+            out += place.of(known[j, k]) * times[:, None]
+        return out
 
     # -- pieces of the path -------------------------------------------------------------------------------------------
 

@@ -108,6 +108,17 @@ def test_instants_about_the_rows_are_enough_where_drives_have_no_memory(job, nam
     np.testing.assert_allclose(few, read(twin_of(job), run_path, one), rtol=1e-13)
 
 
+def test_carriages_far_off_their_set_points_move_the_tip_along_the_curve_of_the_machine(job):
+    """Beside the structure that is solved where they stand; along a straight line the tip is some 40 um off."""
+    twin, run_path = twin_of(job), a_run(job)
+    x = cause("joint_offset", offset_mm=4.0)
+    far = [x, replace(x, target="y", values={**x.values, "offset_mm": -3.0})]
+    _, solved = twin.sense(run_path)
+    slopes = twin.slopes(run_path, (), solved)
+    tip = twin.sense(run_path, far, solved=solved, slopes=slopes)[0].tip
+    np.testing.assert_allclose(tip, read(twin, run_path, far)[:, :3], atol=1e-3)
+
+
 def test_drives_with_a_memory_see_the_whole_run(job):
     """The place of a reversal between two rows decides the later state of the play."""
     one, run_path = [cause("screw_pitch", error_ppm=300.0), cause("backlash", width_mm=20.0)], a_run(job)
