@@ -22,12 +22,12 @@ from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import display_name, open_source, read_bytes, write_all
 from camcomp.ground.places import STANDARD
 from camcomp.model.from_program import StockChoice, job_of_program
-from camcomp.report.inputs import Input
 
 __all__ = ["CompensatedProgram", "Summary", "compensate", "compensate_file"]
 
 if TYPE_CHECKING:
     from camcomp.compensation.file_to_file import FileOutcome
+    from camcomp.report.inputs import Input
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +184,7 @@ def compensate_file(
     asked_for: list[tuple[str | None, Callable[[str], bytes]]] = [
         (output, lambda _: result.data), (joints, result.joint_file), (paths, lambda _: result.paths_file()),
         (summary, lambda _: result.summary.to_json()),
-        (report, lambda _: result.report([Input("program", name, data), *_configurations(configs)])),
+        (report, lambda _: result.report(_inputs(name, data, configs))),
     ]  # fmt: skip
     outputs = {each: make(each) for each, make in asked_for if each}
     failed = result.failed
@@ -193,6 +193,9 @@ def compensate_file(
     return FileOutcome(result.summary, failed, {each: len(made) for each, made in outputs.items()})
 
 
-def _configurations(configs: Sequence[str]) -> list[Input]:
-    """The machine files as inputs of a report, without standard input."""
-    return [Input("configuration", display_name(each), read_bytes(each)) for each in configs if each != STANDARD]
+def _inputs(name: str, data: bytes, configs: Sequence[str]) -> list[Input]:
+    """The program and the machine files as inputs of a report, without standard input."""
+    from camcomp.report.inputs import Input  # slow import, needed for a report only
+
+    files = [Input("configuration", display_name(each), read_bytes(each)) for each in configs if each != STANDARD]
+    return [Input("program", name, data), *files]

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 
+from camcomp.dialects.krl import POSE
 from camcomp.gcode.path_mode import ROUNDING_DISTANCE, PathMode
 from camcomp.gcode.robot_frames import IDENTITY, CoordinateFrame
 from camcomp.gcode.robot_language import BLANKS, MoveSite
@@ -10,7 +11,6 @@ from camcomp.gcode.robot_reader import EXACT, RobotReader
 from camcomp.ground.datatypes import ARC, LINE, RAPID
 from camcomp.ground.errors import ProgramError, raise_all
 
-POSE = ("X", "Y", "Z", "A", "B", "C")
 AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
 _OTHERS = frozenset(("S", "T", *(f"E{n}" for n in range(1, 7))))
 _NUMBER = r"[-+]?(?:\d{1,12}\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from camcomp.dialects.fanuc_ls import COMPONENTS, SECTION
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.robot_frames import IDENTITY
 from camcomp.gcode.robot_language import MoveSite
@@ -12,9 +13,8 @@ from camcomp.gcode.robot_reader import EXACT, RobotReader
 from camcomp.ground.datatypes import ARC, LINE, RAPID
 from camcomp.ground.errors import ProgramError, raise_all
 
-COMPONENTS = ("X", "Y", "Z", "W", "P", "R")
 JOINTS = ("J1", "J2", "J3", "J4", "J5", "J6")
-SECTION = re.compile(r"^[ \t]*/(MN|POS|END)[ \t\r]*$", re.MULTILINE | re.IGNORECASE)
+_SECTION = re.compile(SECTION, re.MULTILINE | re.IGNORECASE)
 POSITION = re.compile(r"P\[(\d+)(?::[^\]]*)?\][ \t]*\{(.*?)\}[ \t]*;", re.DOTALL | re.IGNORECASE)
 _NUMBER = r"[-+]?(?:\d{1,12}\.?\d*|\.\d+)"
 _VALUE = re.compile(rf"\b([XYZWPR]|[JE]\d)[ \t]*=[ \t]*({_NUMBER})[ \t]*(mm|deg)\b", re.IGNORECASE)
@@ -66,7 +66,7 @@ class LsProgram:
 
     def run(self) -> None:
         """Positions first, for they stand behind the statements; a mistake does not hide the next."""
-        string, sections = self.text.string, {each[1].upper(): each for each in SECTION.finditer(self.text.string)}
+        string, sections = self.text.string, {each[1].upper(): each for each in _SECTION.finditer(self.text.string)}
         if "MN" not in sections or "POS" not in sections or sections["POS"].start() < sections["MN"].end():
             raise ProgramError("CC144", "the program has no /MN with a /POS behind it", at=self.text.place(0))
         begin, end = sections["MN"].end(), sections["POS"].start()

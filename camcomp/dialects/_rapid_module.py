@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from camcomp.dialects.rapid import COMPONENTS
 from camcomp.gcode.path_mode import ROUNDING_DISTANCE, PathMode
 from camcomp.gcode.robot_frames import IDENTITY, CoordinateFrame
 from camcomp.gcode.robot_language import BLANKS, MoveSite
@@ -14,7 +15,6 @@ from camcomp.ground.datatypes import ARC, LINE, RAPID
 from camcomp.ground.errors import ProgramError, raise_all
 from camcomp.ground.orientation import rotations_of_quaternions
 
-COMPONENTS = ("X", "Y", "Z", "Q1", "Q2", "Q3", "Q4")
 MODULE = re.compile(r"\s*MODULE\s+\w+", re.IGNORECASE)
 FASTEST_ZONE_MM = {0: 0.3}  # z0; zN is a zone of N mm
 _NUMBER = re.compile(r"\s*([-+]?(?:\d{1,12}\.?\d*|\.\d+)(?:E[-+]?\d{1,2})?)\s*", re.IGNORECASE)

@@ -7,7 +7,6 @@ import re
 
 import numpy as np
 
-from camcomp.dialects._ls_program import COMPONENTS, POSITION, SECTION, LsProgram
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.robot_language import Edit, MoveSite, NewMove, RobotLanguage
 from camcomp.gcode.robot_reader import RobotReader
@@ -15,6 +14,8 @@ from camcomp.gcode.text import Text
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.orientation import RPY, rotations_of, words_of
 
+COMPONENTS = ("X", "Y", "Z", "W", "P", "R")
+SECTION = r"^[ \t]*/(MN|POS|END)[ \t\r]*$"
 _NEW = re.compile(r"P\[@(\d+)((?: [-+.\deE]+){6})\]")
 
 
@@ -27,6 +28,8 @@ class FanucLs(RobotLanguage):
 
     def read(self, reader: RobotReader) -> None:
         """Every statement of the program. Raises ProgramError with every mistake."""
+        from camcomp.dialects._ls_program import LsProgram  # slow import, not needed to detect other dialects
+
         LsProgram(reader).run()
 
     def poses(self, values: Floats) -> tuple[Floats, Floats]:
@@ -72,6 +75,8 @@ class FanucLs(RobotLanguage):
         """New positions get numbers, and their lines at the end of /POS."""
         if not _NEW.search(string):
             return string
+        from camcomp.dialects._ls_program import POSITION
+
         blocks = {int(each[1]): each for each in POSITION.finditer(string)}
         eol = "\r\n" if "\r\n" in string else "\n"
         number, made, known = max(blocks), [], dict[tuple[str, str], int]()
@@ -112,7 +117,7 @@ def _block(pattern: re.Match[str], number: int, values: list[str]) -> str:
 DIALECT = Dialect(
     name="fanuc_ls",
     title="Fanuc LS",
-    marks=((r"^[ \t]*/PROG\b", 10), (SECTION.pattern, 6)),
+    marks=((r"^[ \t]*/PROG\b", 10), (SECTION, 6)),
     endings=(".ls",),
     robot=FanucLs(),
     exact_stop="FINE",

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.dialects._krl_module import DEF, POSE, KrlModule, code_of
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.robot_frames import zyx_rotations
 from camcomp.gcode.robot_language import Edit, MoveSite, NewMove, RobotLanguage
@@ -17,6 +16,8 @@ from camcomp.gcode.robot_reader import RobotReader
 from camcomp.gcode.text import Text
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.orientation import RPY, words_of
+
+POSE = ("X", "Y", "Z", "A", "B", "C")
 
 
 class Krl(RobotLanguage):
@@ -27,6 +28,8 @@ class Krl(RobotLanguage):
 
     def read(self, reader: RobotReader) -> None:
         """Every line of the module. Raises ProgramError with every mistake."""
+        from camcomp.dialects._krl_module import KrlModule  # slow import, not needed to detect other dialects
+
         KrlModule(reader).run()
 
     def poses(self, values: Floats) -> tuple[Floats, Floats]:
@@ -66,6 +69,8 @@ class Krl(RobotLanguage):
 
     def stamp_index(self, text: Text) -> int:
         """Behind the line with DEF: in front of it no comment may stand on a line of its own."""
+        from camcomp.dialects._krl_module import DEF, code_of
+
         for row in range(len(text)):
             if DEF.match(code_of(text.line(row))):
                 return int(text.nexts[row])

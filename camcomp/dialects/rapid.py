@@ -5,7 +5,6 @@ Source: ABB, Technical reference manual, RAPID Instructions, Functions and Data 
 
 import numpy as np
 
-from camcomp.dialects._rapid_module import COMPONENTS, MODULE, RapidModule, code_of
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.robot_language import Edit, MoveSite, NewMove, RobotLanguage
 from camcomp.gcode.robot_reader import RobotReader
@@ -13,6 +12,7 @@ from camcomp.gcode.text import Text
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.orientation import quaternions_of, rotations_of_quaternions
 
+COMPONENTS = ("X", "Y", "Z", "Q1", "Q2", "Q3", "Q4")
 QUATERNION_DIGITS = 9  # behind the point: 2 nrad
 
 
@@ -25,6 +25,8 @@ class Rapid(RobotLanguage):
 
     def read(self, reader: RobotReader) -> None:
         """Every line of the module. Raises ProgramError with every mistake."""
+        from camcomp.dialects._rapid_module import RapidModule  # slow import, not needed to detect other dialects
+
         RapidModule(reader).run()
 
     def poses(self, values: Floats) -> tuple[Floats, Floats]:
@@ -66,6 +68,8 @@ class Rapid(RobotLanguage):
 
     def stamp_index(self, text: Text) -> int:
         """Behind the line with MODULE."""
+        from camcomp.dialects._rapid_module import MODULE, code_of
+
         for row in range(len(text)):
             if MODULE.match(code_of(text.line(row))):
                 return int(text.nexts[row])

@@ -4,8 +4,8 @@ import gc
 
 
 def collect_seldom() -> None:
-    """Raise the threshold of the garbage collector: imports create thousands of permanent objects, which saves 0.2 s."""
-    gc.set_threshold(50_000)
+    """Raise the threshold of the garbage collector: imports create 150 000 permanent objects, which saves 0.2 s."""
+    gc.set_threshold(200_000)
 
 
 def keep_what_lives() -> None:

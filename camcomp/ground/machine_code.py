@@ -235,11 +235,16 @@ class CodeFiles:
             each.unlink(missing_ok=True)
 
     def _stem(self) -> str:
-        made_by = (version("numba"), version("llvmlite"), self._source_stamp)
-        return f"{self._base}-{_short(made_by)}-"
+        return f"{self._base}-{_short((*_compiler(), self._source_stamp))}-"
 
     def _path(self, key: Any) -> Path:
         return self.folder / f"{self._stem()}{_short(key)}.nbc"
+
+
+@functools.cache
+def _compiler() -> tuple[str, str]:
+    """Versions of numba and llvmlite."""
+    return version("numba"), version("llvmlite")
 
 
 def _short(what: Any) -> str:

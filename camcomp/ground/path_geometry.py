@@ -32,7 +32,7 @@ def _arc(path: Path, motion: Ints) -> tuple[Floats, Floats, Floats, Floats, Floa
 def points(path: Path, motion: Ints, u: Floats) -> Floats:
     """Programmed tip (k, 3) mm at fraction u (k,) of motion (k,). Ends are exactly the programmed ones."""
     start, end = path.start[motion], path.end[motion]
-    out = start + u[:, None] * (end - start)
+    out: Floats = start + u[:, None] * (end - start)
     arc = path.kind[motion] == ARC
     if arc.any():
         which, at = motion[arc], u[arc]
@@ -42,8 +42,9 @@ def points(path: Path, motion: Ints, u: Floats) -> Floats:
             + turn(first, axis, at * angle) * (1.0 + growth * at)[:, None]
             + (climb * at)[:, None] * axis
         )
-    out = np.where((u == 1.0)[:, None], end, out)
-    return np.where((u == 0.0)[:, None], start, out)
+    last, first = u == 1.0, u == 0.0
+    out[last], out[first] = end[last], start[first]
+    return out
 
 
 def tangents(path: Path, motion: Ints, u: Floats) -> Floats:

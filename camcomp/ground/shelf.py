@@ -13,7 +13,7 @@ from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
@@ -33,7 +33,13 @@ def _own(shelf: str) -> frozenset[str]:
 
 def _announced(shelf: str) -> list[EntryPoint]:
     """Entry points of users' plug-ins."""
-    return list(entry_points(group=f"camcomp.{shelf}"))
+    return list(_installed(tuple(sys.path)).select(group=f"camcomp.{shelf}"))
+
+
+@cache
+def _installed(_path: tuple[str, ...]) -> EntryPoints:
+    """All entry points of the packages on a search path, which take 10 ms to read."""
+    return entry_points()  # type: ignore[return-value]
 
 
 def is_own(shelf: str, name: str) -> bool:

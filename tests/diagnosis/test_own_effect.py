@@ -2,12 +2,11 @@
 
 import json
 import sys
-from importlib.metadata import EntryPoint
 
 import numpy as np
 import pytest
 
-from camcomp.ground import shelf
+from tests.installed import install
 from tests.validation import runner
 from tests.validation.plants import designs
 
@@ -37,16 +36,8 @@ WAVE = 0.03
 @pytest.fixture
 def own(tmp_path, monkeypatch):
     """The user's package is installed."""
-    (tmp_path / "wavy_ram.py").write_text(SOURCE)
+    install(tmp_path, "effects", "wavy_ram", SOURCE)
     monkeypatch.syspath_prepend(str(tmp_path))
-    points = [EntryPoint("wavy_ram", "wavy_ram", "camcomp.effects")]
-    theirs = shelf.entry_points
-
-    def entry_points(group, name=None):
-        mine = [each for each in points if each.group == group and name in (None, each.name)]
-        return [*mine, *(theirs(group=group) if name is None else theirs(group=group, name=name))]
-
-    monkeypatch.setattr(shelf, "entry_points", entry_points)
     yield
     sys.modules.pop("wavy_ram", None)
 

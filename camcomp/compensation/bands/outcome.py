@@ -127,9 +127,13 @@ class Bands:
 
 
 def _weighted_quantile(values: Floats, weights: Floats, level: float) -> float:
+    """Smallest value (k,) up to which the weights (k,) sum to `level` of all of them, at least 0.5."""
+    goal, middle = level * float(weights.sum()), int((2.0 * level - 1.0) * len(values))
+    upper = values > np.partition(values, middle)[middle]
+    if len(values) and (below := float(weights[~upper].sum())) < goal:  # sorting the upper values is enough
+        values, weights, goal = values[upper], weights[upper], goal - below
     order = np.argsort(values)
-    reached = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(reached, level * reached[-1])])
+    return float(values[order[np.searchsorted(np.cumsum(weights[order]), goal)]])
 
 
 ADVICE = (

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.compensation.long.field import Field
+from camcomp.compensation.long.proof import judge
 from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.compensation.program.compensate import Compensated, compensate
 from camcomp.compensation.program.result import Interpolation
@@ -41,10 +42,11 @@ class InterpolatedMachine:
             commanded = near
             if rho is not None:
                 commanded = _tips(known, rho, near, nominal, tile)
-            shift, _, within = known.look(commanded, force, every=False)
-            tip = commanded + shift[:, 3:6]
+                answer, _, within = known.look(commanded, force, every=False)
+                tile = np.minimum(tile, within)
+            tip = commanded + answer[:, 3:6]
             answer, _, inside = known.look(tip, force)
-            tile = np.minimum(tile, np.minimum(within, inside))
+            tile = np.minimum(tile, inside)
             own = nominal if rho is None else rho
         else:
             own = nominal + answer[:, 9 + m :]
@@ -95,7 +97,7 @@ class InterpolatedMachine:
         exact = correct(self.machine, p, f)
         tip, settled = settle(self.machine, p, f)
         gaps, drive = (aimed.commanded - exact.commanded, free.tip - tip), free.drive - settled.drive
-        return self._field.proof(gaps, aimed.rho - exact.rho, drive, 2 * len(p) + self._exact)
+        return judge(self._field, gaps, aimed.rho - exact.rho, drive, 2 * len(p) + self._exact)
 
 
 def compensate_whole(program: Program, job: Job, *, method: str, **settings: Any) -> Compensated:

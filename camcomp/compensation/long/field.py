@@ -30,7 +30,6 @@ from camcomp.compensation.long.kernel import (
     put_cells,
 )
 from camcomp.compensation.long.tile_files import TileFiles
-from camcomp.compensation.program.result import BOUND_UM, Interpolation
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.solve import FREE, TARGET, solve, threads
@@ -199,19 +198,6 @@ class Field:
         for key, tiles, loaded in (*self._narrower, (self._key, self.tiles, self._loaded)):
             if self._files is not None and (tiles is not loaded or not sound):
                 self._files.save(key, vars(tiles) if sound else None)
-
-    def proof(self, gaps: tuple[Floats, ...], joints: Floats, drive: Floats, solved: int) -> Interpolation:
-        """Result of a check by points (k,) solved exactly; keeps the tiles if they are good enough.
-
-        gaps (k, 3) mm, joints (k, m), drive (k, m): differences; solved: exact solutions besides those of the tiles.
-        """
-        worst = max(1e3 * float(np.abs(each).max()) for each in (*gaps, joints * self.reach))
-        self.keep(sound=worst <= BOUND_UM)
-        return Interpolation(
-            bound_um=BOUND_UM, checked=len(drive), worst_um=worst if np.isfinite(worst) else float("inf"),
-            worst_drive_force=float(np.nan_to_num(np.abs(drive), nan=np.inf).max()), tiles=int(self.used.sum()),
-            exact_solutions=int(self.tiles.solved[self.used].sum()) + solved,
-        )  # fmt: skip
 
     @property
     def reach(self) -> Floats:

@@ -4,14 +4,30 @@ from __future__ import annotations
 
 import numpy as np
 
+from camcomp.compensation.long.field import Field
 from camcomp.compensation.long.linear_corrector import CorrectedRun, LinearCorrector
-from camcomp.compensation.program.result import Interpolation
+from camcomp.compensation.program.result import BOUND_UM, Interpolation
 from camcomp.compensation.program.totals import JointTableRows
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.job import Job
+from camcomp.model.statics.solve import inverse
 from camcomp.model.statics.target import correct, settle
 
-MOST_CHECKED, CHECKED_SHARE = 1000, 0.05  # points that are solved exactly, at most and of all
+MOST_CHECKED, CHECKED_SHARE = 1000, 0.02  # points that are solved exactly, at most and of all
+
+
+def judge(field: Field, gaps: tuple[Floats, ...], joints: Floats, drive: Floats, solved: int) -> Interpolation:
+    """Result of a check by points (k,) solved exactly; keeps the tiles if they are good enough.
+
+    gaps (k, 3) mm, joints (k, m), drive (k, m): differences; solved: exact solutions besides those of the tiles.
+    """
+    worst = max(1e3 * float(np.abs(each).max()) for each in (*gaps, joints * field.reach))
+    field.keep(sound=worst <= BOUND_UM)
+    return Interpolation(
+        bound_um=BOUND_UM, checked=len(drive), worst_um=worst if np.isfinite(worst) else float("inf"),
+        worst_drive_force=float(np.nan_to_num(np.abs(drive), nan=np.inf).max()), tiles=int(field.used.sum()),
+        exact_solutions=int(field.tiles.solved[field.used].sum()) + solved,
+    )  # fmt: skip
 
 
 class Sample:
@@ -28,7 +44,8 @@ class Sample:
         chosen = np.flatnonzero(self._random.random(len(rows.s)) < self._share)
         if len(chosen):
             answers, target = done.answers, corrector.job.frame.to_machine(rows.target)
-            moves = (answers.correction, answers.unloaded, rows.joints, rows.drive, corrector.off(done))
+            drive = answers.rest[:, 3 : 3 + rows.drive.shape[1]]
+            moves = (answers.correction, answers.unloaded, drive, rows.joints, corrector.off(done))
             self._rows.append(np.concatenate([each[chosen] for each in (target, rows.force, *moves)], axis=1))
 
     def add_points(self, job: Job, rows: JointTableRows, corrected: Bools) -> None:
@@ -51,14 +68,8 @@ class Sample:
         count, m = min(MOST_CHECKED, max(MOST_CHECKED // 10, int(CHECKED_SHARE * points))), len(machine.actuators)
         sample = sample[self._random.permutation(len(sample))[:count]]
         sample = sample[np.lexsort(sample[:, :3].T)]
-        p, f, correction, unloaded, joints, drive, off = np.split(sample, np.cumsum([3, 3, 3, 3, m, m]), axis=1)
-        exact, (tip, _), (_, written) = (
-            correct(machine, p, f),
-            settle(machine, p, f),
-            settle(machine, p + correction + off, f),
-        )
-        gaps = (exact.commanded - p - correction, tip - p - unloaded)
-        found = corrector.field.proof(
-            gaps, written.rho_nominal - joints, written.drive - drive, 3 * len(p) + 2 * corrector.exact
-        )
+        p, f, correction, unloaded, drive, joints, off = np.split(sample, np.cumsum([3, 3, 3, 3, m, m]), axis=1)
+        exact, (tip, _) = correct(machine, p, f), settle(machine, p, f)
+        gaps, written = (exact.commanded - p - correction, tip - p - unloaded), inverse(machine, p + correction + off)
+        found = judge(corrector.field, gaps, written - joints, exact.drive - drive, 2 * len(p) + 2 * corrector.exact)
         return found, int(exact.iterations.max())

@@ -100,7 +100,8 @@ def see(
     """The loaded machine at commanded points (k, 3) mm, program frame; words (N, 3): of the orientation at end points."""
     if orienting is not None and words is not None:
         return _see_oriented(job, points, told, orienting, words)
-    tip, state = respond(job, told, points.travel, points.target, before=points.before)
+    masses_at = points.target if job.causes else None  # masses move with the target
+    tip, state = respond(job, told, points.travel, masses_at, before=points.before)
     return _seen(points, tip, state)
 
 

@@ -51,7 +51,7 @@ def read_tree(data: bytes, name: str) -> tuple[Node | None, list[ConfigError]]:
         return None, [ConfigError("CC200", "the file is not UTF-8 text", at=at, hint="save it as UTF-8")]
     builder = _Builder(name, text.splitlines())
     try:
-        yaml = YAML(typ="rt", pure=True)
+        yaml = YAML(typ="safe", pure=True)
         yaml.Composer = _Composer
         root = yaml.compose(text)
     except _BeyondBudget as error:

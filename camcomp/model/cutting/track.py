@@ -156,7 +156,7 @@ class Track:
             piece=piece,
             w=w,
             direction=direction,
-            tip=self.points(piece, w),
+            height=lambda on: self.points(piece[on], w[on])[:, 2],
             driven=feed,
             turned=turned,
         )
@@ -220,13 +220,14 @@ def _force(
     piece: Ints,
     w: Floats,
     direction: Floats,
-    tip: Floats,
+    height: Callable[[Bools], Floats],
     driven: Floats | None = None,
     turned: Floats | None = None,
 ) -> Floats:
     """Model force (k, 3) N for given feed directions, program frame.
 
-    turned (k, 3, 3): rotation of the tool from the axis of the conditions. The model sees the feed in the frame of the tool.
+    height: z (mm) of the tips at points given by a mask (k,), for a depth below the stock's top. turned (k, 3, 3):
+    rotation of the tool from the axis of the conditions. The model sees the feed in the frame of the tool.
     """
     out = np.zeros((len(piece), 3))
     on = cutting[piece] & (np.linalg.norm(direction, axis=1) > 0.0)
@@ -239,7 +240,7 @@ def _force(
         rows = motion[piece[on]]
         depth, width = (np.full(len(rows), np.nan if each is None else each) for each in (c.depth_mm, c.width_mm))
         if c.depth_mm is None and c.stock_top_mm is not None:
-            depth = c.stock_top_mm - tip[on][:, 2]
+            depth = c.stock_top_mm - height(on)
         found = _components(
             path=path, c=c, motion=rows, direction=seen[on], depth=depth, width=width,
             s=s0[piece[on]] + w[on] * length[piece[on]], ends=w[on] == 1.0, arcs=None,
@@ -377,7 +378,8 @@ def _end_force(track: Track, piece: Ints, w: Floats, direction: Floats) -> Float
     u = np.where(w == 0.0, track.u0[piece], track.u1[piece])
     return _force(
         path=path, c=track.conditions, cutting=track.cutting, motion=track.motion, s0=track.s0, length=track.length,
-        load=track.load, piece=piece, w=w, direction=direction, tip=path_geometry.points(path, motion, u),
+        load=track.load, piece=piece, w=w, direction=direction,
+        height=lambda on: path_geometry.points(path, motion[on], u[on])[:, 2],
         turned=None if path.orientation is None else path.orientation.rotations(motion, u),
     )  # fmt: skip
 
