@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable, Sequence
 
-from camcomp.dialects.krl import POSE
 from camcomp.gcode.path_mode import ROUNDING_DISTANCE, PathMode
 from camcomp.gcode.robot_frames import IDENTITY, CoordinateFrame
 from camcomp.gcode.robot_language import BLANKS, MoveSite
@@ -76,7 +75,7 @@ class KrlModule:
     """Executes the statements of one module in order."""
 
     def __init__(self, reader: RobotReader) -> None:
-        self.reader, self.text = reader, reader.text
+        self.reader, self.text, self.names = reader, reader.text, reader.language.components
         self.begun = self.ended = False
         self.held: list[float] | None = None  # X to C behind the last move
         self.angles: list[float] | None = None  # A1 to A6
@@ -230,10 +229,10 @@ class KrlModule:
             also = f" or {name[1:]}_DATA[n]" if name[0] == "$" else ""
             hint = f"write {{X ..., Y ..., Z ..., A ..., B ..., C ...}}{also}"
             self.reader.refuse("CC145", f"{name} is not given as numbers", at, hint)
-        numbers = self._numbers(value, at, POSE)
+        numbers = self._numbers(value, at, self.names)
         if len(numbers) < 6:
             self.reader.refuse("CC145", f"{name} does not state all of X, Y, Z, A, B, C", at)
-        values = [numbers[each] for each in POSE]
+        values = [numbers[each] for each in self.names]
         return CoordinateFrame.of(values[:3], values[3:])
 
     def _take_numbered(self, name: str, kind: str, number: int, at: int) -> None:
@@ -377,7 +376,7 @@ class KrlModule:
         blend: tuple[int, int],
     ) -> Callable[..., MoveSite]:
         spans, close = target
-        numbers = {name: spans[name] for name in POSE if name in spans}
+        numbers = {name: spans[name] for name in self.names if name in spans}
 
         def site(near: Sequence[float], said: Sequence[float] | None) -> MoveSite:
             return MoveSite(
@@ -393,7 +392,8 @@ class KrlModule:
             self.reader.refuse("CC144", f"the target is {name}, not a pose written inline", move,
                                "post poses inline; positions of a .dat file are not read")  # fmt: skip
         spans, close = self._fields(string, at)
-        allowed = (set(POSE) | _OTHERS) if spans.keys() & set(POSE) else (set(AXES) | _OTHERS)
+        pose = set(self.names)
+        allowed = (pose if spans.keys() & pose else set(AXES)) | _OTHERS
         if wrong := sorted(spans.keys() - allowed):
             self.reader.refuse("CC144", f"{wrong[0]} is no component of a target", spans[wrong[0]][0])
         if not spans:
@@ -415,16 +415,18 @@ class KrlModule:
     ) -> None:  # fmt: skip
         poses = []
         for spans, _ in targets:
-            given = self._values(spans, POSE)
+            given = self._values(spans, self.names)
             if len(given) < 6 and self.held is None:
-                missing = ", ".join(each for each in POSE if each not in given)
+                missing = ", ".join(each for each in self.names if each not in given)
                 self.reader.refuse(
                     "CC134",
                     f"{missing} are not known here",
                     at,
                     "behind joint angles, another frame or CA, name X, Y, Z, A, B and C",
                 )
-            poses.append([given[each] if each in given else (self.held or [0.0] * 6)[k] for k, each in enumerate(POSE)])
+            poses.append(
+                [given[each] if each in given else (self.held or [0.0] * 6)[k] for k, each in enumerate(self.names)]
+            )
         end = poses[-1]
         if kind == "CIRC":
             if not self.circ_stated:

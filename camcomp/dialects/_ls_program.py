@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from camcomp.dialects.fanuc_ls import COMPONENTS, SECTION
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.robot_frames import IDENTITY
 from camcomp.gcode.robot_language import MoveSite
@@ -14,7 +13,7 @@ from camcomp.ground.datatypes import ARC, LINE, RAPID
 from camcomp.ground.errors import ProgramError, raise_all
 
 JOINTS = ("J1", "J2", "J3", "J4", "J5", "J6")
-_SECTION = re.compile(SECTION, re.MULTILINE | re.IGNORECASE)
+_SECTION = re.compile(r"^[ \t]*/(MN|POS|END)[ \t\r]*$", re.MULTILINE | re.IGNORECASE)
 POSITION = re.compile(r"P\[(\d+)(?::[^\]]*)?\][ \t]*\{(.*?)\}[ \t]*;", re.DOTALL | re.IGNORECASE)
 _NUMBER = r"[-+]?(?:\d{1,12}\.?\d*|\.\d+)"
 _VALUE = re.compile(rf"\b([XYZWPR]|[JE]\d)[ \t]*=[ \t]*({_NUMBER})[ \t]*(mm|deg)\b", re.IGNORECASE)
@@ -107,7 +106,7 @@ class LsProgram:
             key = each[1].upper()
             values[key], spans[key] = float(each[2]), (found.start(2) + each.start(2), found.start(2) + each.end(2))
         named = {each[1].upper() for each in _FIELD.finditer(found[2])}
-        for names in (COMPONENTS, JOINTS):
+        for names in (self.reader.language.components, JOINTS):
             if set(names) <= values.keys() and named <= values.keys():
                 break
         else:
@@ -238,7 +237,7 @@ class LsProgram:
                 self.reader.refuse("CC115", f"{key} moves an external axis during a cut", at, "move it with J")
             if key[0] == "E":
                 self.external[key] = angle
-        return [found.values[each] for each in COMPONENTS]
+        return [found.values[each] for each in self.reader.language.components]
 
     def _site(
         self, row: int, instruction: tuple[int, int], number: int, blend: tuple[int, int], written: LsMove
@@ -246,7 +245,7 @@ class LsProgram:
         values = self._values(number, written.target[0], cut=False)
         spans = self.positions[number].spans
         site = MoveSite(
-            row=row, instruction=instruction, numbers={each: spans[each] for each in COMPONENTS}, close=instruction[1], blend=blend,
+            row=row, instruction=instruction, numbers={each: spans[each] for each in self.reader.language.components}, close=instruction[1], blend=blend,
             base=self.reader.base, tool=self.reader.tool, near=tuple(values), said=tuple(values), more=written,
         )  # fmt: skip
         return site, values

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.dialects.rapid import COMPONENTS
 from camcomp.gcode.path_mode import ROUNDING_DISTANCE, PathMode
 from camcomp.gcode.robot_frames import IDENTITY, CoordinateFrame
 from camcomp.gcode.robot_language import BLANKS, MoveSite
@@ -271,7 +270,7 @@ class RapidModule:
         rest = ",".join(self.text.string[slice(*_span(each))] for each in (conf, external))
         places = [each[1] for each in (*point.items, *turn.items)]
         site = MoveSite(
-            row=row, instruction=instruction, numbers=dict(zip(COMPONENTS, places, strict=True)), close=argument[1], blend=zone,
+            row=row, instruction=instruction, numbers=dict(zip(self.reader.language.components, places, strict=True)), close=argument[1], blend=zone,
             base=self.reader.base, tool=self.reader.tool, near=tuple(values), said=tuple(values),
             more=Written(declared, argument, rest, end),
         )  # fmt: skip

@@ -15,7 +15,6 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.orientation import RPY, rotations_of, words_of
 
 COMPONENTS = ("X", "Y", "Z", "W", "P", "R")
-SECTION = r"^[ \t]*/(MN|POS|END)[ \t\r]*$"
 _NEW = re.compile(r"P\[@(\d+)((?: [-+.\deE]+){6})\]")
 
 
@@ -117,7 +116,7 @@ def _block(pattern: re.Match[str], number: int, values: list[str]) -> str:
 DIALECT = Dialect(
     name="fanuc_ls",
     title="Fanuc LS",
-    marks=((r"^[ \t]*/PROG\b", 10), (SECTION, 6)),
+    marks=((r"^[ \t]*/PROG\b", 10), (r"^[ \t]*/(MN|POS|END)[ \t\r]*$", 6)),
     endings=(".ls",),
     robot=FanucLs(),
     exact_stop="FINE",

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from camcomp.compensation.long.field import Field
-from camcomp.compensation.long.linear_corrector import CorrectedRun, LinearCorrector
 from camcomp.compensation.program.result import BOUND_UM, Interpolation
-from camcomp.compensation.program.totals import JointTableRows
 from camcomp.ground.datatypes import Bools, Floats
-from camcomp.model.job import Job
 from camcomp.model.statics.solve import inverse
 from camcomp.model.statics.target import correct, settle
+
+if TYPE_CHECKING:
+    from camcomp.compensation.long.linear_corrector import CorrectedRun, LinearCorrector
+    from camcomp.compensation.program.totals import JointTableRows
+    from camcomp.model.job import Job
 
 MOST_CHECKED, CHECKED_SHARE = 1000, 0.02  # points that are solved exactly, at most and of all
 
