@@ -15,7 +15,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -244,7 +244,17 @@ class CodeFiles:
 @functools.cache
 def _compiler() -> tuple[str, str]:
     """Versions of numba and llvmlite."""
-    return version("numba"), version("llvmlite")
+    return _version("numba"), _version("llvmlite")
+
+
+def _version(package: str) -> str:
+    found = find_spec(package)
+    file = Path(found.origin).with_name("_version.py") if found is not None and found.origin else None
+    if file is not None and file.is_file():
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    from importlib.metadata import version  # slow import
+
+    return version(package)
 
 
 def _short(what: Any) -> str:

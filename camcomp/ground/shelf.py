@@ -6,6 +6,8 @@ skipped with a warning. Tests check camcomp's own plug-ins; the code for users' 
 which keeps the start fast.
 """
 
+from __future__ import annotations
+
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -13,12 +15,14 @@ from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from camcomp.ground.errors import ConfigError, Location, PluginWarning, Terminated
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 SHELVES = ("robots", "dialects", "forces", "effects", "comments", "tool_tables")
 
@@ -33,13 +37,21 @@ def _own(shelf: str) -> frozenset[str]:
 
 def _announced(shelf: str) -> list[EntryPoint]:
     """Entry points of users' plug-ins."""
-    return list(_installed(tuple(sys.path)).select(group=f"camcomp.{shelf}"))
+    if not _some_are_announced(tuple(sys.path)):
+        return []
+    from importlib.metadata import entry_points  # slow import, needed with plug-ins of users only
+
+    return list(entry_points(group=f"camcomp.{shelf}"))
 
 
 @cache
-def _installed(_path: tuple[str, ...]) -> EntryPoints:
-    """All entry points of the packages on a search path, which take 10 ms to read."""
-    return entry_points()  # type: ignore[return-value]
+def _some_are_announced(path: tuple[str, ...]) -> bool:
+    """Whether a package on the search path announces plug-ins; a package in an archive counts as one that does."""
+    folders = [Path(each) for each in path]
+    if any(each.is_file() for each in folders):
+        return True
+    files = (file for each in folders if each.is_dir() for file in each.glob("*-info/entry_points.txt"))
+    return any(b"[camcomp." in file.read_bytes() for file in files)
 
 
 def is_own(shelf: str, name: str) -> bool:

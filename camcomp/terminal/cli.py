@@ -134,6 +134,7 @@ def main(args: list[str] | None = None) -> None:
     """Run the command line and leave the process with the exit code of the contract."""
     stand_in_for_closed()
     collect_seldom()
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # saves a search through all installed packages
     _end_on_signals()
     code = run(sys.argv[1:] if args is None else args)
     try:
