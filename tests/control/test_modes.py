@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from camcomp.compensation.long import control_account
 from camcomp.compensation.long.program import LongProgram
+from camcomp.compensation.program import control_account
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.totals import Totals
 from camcomp.compensation.program.verify import verify

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from camcomp.compensation.long.control_account import ControlAccount, SeenPoints
 from camcomp.compensation.long.linear_corrector import CorrectedRun, LinearCorrector
 from camcomp.compensation.long.linear_run import LinearRun
 from camcomp.compensation.long.runs import Runs
 from camcomp.compensation.program.compensate import Compensated
+from camcomp.compensation.program.control_account import ControlAccount, PointsOnMoves
 from camcomp.compensation.program.totals import JointTableRows, Totals
-from camcomp.compensation.program.under_control import control_warnings, written_moves
+from camcomp.compensation.program.under_control import control_warnings, programmed_moves, written_moves
 from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.uncorrected import UncorrectedFeeds, below_step_warning
@@ -22,7 +22,7 @@ from camcomp.model.control import limits_of
 from camcomp.model.cutting.assumed import ForceDoubts
 from camcomp.model.cutting.spindle import spindle_warning
 from camcomp.model.job import Job
-from camcomp.model.trajectory.moves import line_moves, moves_of
+from camcomp.model.trajectory.moves import line_moves
 
 SAME_MM = 1e-9  # of a place as programmed and as written
 
@@ -118,25 +118,23 @@ class TotalsOfPieces(Totals):
         self.resting += int(done.rest.sum())
         ends = len(rows.move) - np.count_nonzero(rows.joining | (linear.kind[rows.move] == RAPID))
         seen = done.seen
-        told = np.concatenate((done.written[seen[:ends]], 0.5 * (start + done.written)[seen[ends:]]))
         joining = np.concatenate((rows.joining, [False]))
-        line = linear.row[rows.move[seen]] + run.row0 + 1
-        after.add(moves, SeenPoints(seen, told, done.after, line, joining[seen - 1] | joining[seen + 1]))
+        points = PointsOnMoves(
+            move=seen, error=done.after, line=linear.row[rows.move[seen]] + run.row0 + 1,
+            commanded=np.concatenate((done.written[seen[:ends]], 0.5 * (start + done.written)[seen[ends:]])),
+            joined=joining[seen - 1] | joining[seen + 1],
+        )  # fmt: skip
+        after.add(moves, points)
 
     def _exact_control(self, result: Compensated, own: Bools, part: Part) -> None:
         """Plan the moves of exactly corrected lines as the controller does."""
-        program, control = result.program, result.control
-        path, modes, (before, after) = program.path, program.modes, self._control
+        program, control, (before, after) = result.program, result.control, self._control
+        path, modes = program.path, program.modes
         self.modes |= {modes[k]: None for k in range(part.first, part.last) if path.kind[k] != RAPID}
-        mine = slice(part.first, part.last)
-        before.add(moves_of(path, modes, self._fed(path.feed), program.per_turn).take(mine))
-        first = int(np.flatnonzero(own)[0])
-        default = self.job.config.process.feed_mm_per_min or np.nan
-        moves = written_moves(program, result.rows, result.written, default)
-        moves = replace(moves, exact=moves.exact | control.rest).take(own)
+        before.add(programmed_moves(program, self.job).take(slice(part.first, part.last)))
+        moves = written_moves(program, self.job, result.rows, result.written, control.rest)
         self.resting += int(control.rest.sum())
-        lines = result.lines[control.row]
-        after.add(moves, SeenPoints(control.row - first, control.told, result.missed, lines, control.joined))
+        after.add(moves.take(own), control.points.take(slice(None), int(np.flatnonzero(own)[0])))
 
     def finish(self, runs: Runs, stock: list[str]) -> None:
         """Collect the times and the warnings of all parts, also those of the stock."""
@@ -147,7 +145,7 @@ class TotalsOfPieces(Totals):
         feeds, control = self._feeds.warnings(), self._control[1]
         self.warnings = [*runs.warnings, *feeds, *runs.behind_end]
         self.warnings += control_warnings(
-            tuple(self.modes), control.beside, control.elsewhere, exact_stop=runs.language.exact_stop,
+            tuple(self.modes), control.at_joins, control.elsewhere, exact_stop=runs.language.exact_stop,
             resting=self.resting, apart=self.apart,
         )  # fmt: skip
         self.warnings += spindle_warning(np.array(self._still, np.int64))

@@ -372,7 +372,7 @@ class _Correction:
             refuse_unsolved(program, track, points.piece[judged], points.target[judged], seen.status[judged])
         still = np.intersect1d(cut_without_spindle(track), program.path.line[track.motion[self.feeding]])
         written, control = self._controlled(found)
-        warnings = [*program.warnings, *self._warnings(found, control, still)]
+        warnings = [*program.warnings, *self._warnings(control, still)]
         line, nominal = program.path.line[rows.motion], before.state.rho_nominal
         warnings += check_posture(program, job, line, job.frame.to_machine(rows.target), nominal)
         state = after.state
@@ -395,7 +395,7 @@ class _Correction:
         written = self._rewritten(rows, rest) if rest.any() else found.written
         planned = partial(
             under_control, self.program, self.job, rows=rows, written=written, points=found.points,
-            told=found.commanded, missed=found.missed, rest=rest,
+            told=found.commanded, missed=found.missed, rest=rest, tolerance_um=self.tolerance_um,
         )  # fmt: skip
         control = planned()
         if self.part is None and control.stated and 1e3 * control.off_joins > self.tolerance_um * (1.0 + 1e-9):
@@ -404,10 +404,9 @@ class _Correction:
                 return self._rewritten(rows, rest, apart), other
         return written, control
 
-    def _warnings(self, found: _Division, control: UnderControl, still: Ints) -> list[str]:
-        program, job, track, points = self.program, self.job, self.track, found.points
-        lines = program.path.line[track.motion[points.piece[points.judged]]]
-        out = _warm_up(job) + control.warnings(lines, self.tolerance_um, program.language)
+    def _warnings(self, control: UnderControl, still: Ints) -> list[str]:
+        program, job, track = self.program, self.job, self.track
+        out = _warm_up(job) + control.warnings(program.language)
         out += [*self.turns.warning(), *spindle_warning(still)]
         if self.part is None:
             doubts = ForceDoubts(config=job.config)

@@ -40,13 +40,6 @@ class ErrorSum:
         return ErrorSize(rms_um=float(np.sqrt(self._squares / max(self._count, 1))), max_um=self.most_um)
 
 
-def error_size(error: Floats) -> ErrorSize:
-    """RMS and largest size of errors (k, 3) mm, in µm; NaN rows are ignored."""
-    out = ErrorSum()
-    out.add(error)
-    return out.figures()
-
-
 def worse_than_before(before_um: float, after_um: float, step_mm: float) -> list[tuple[str, str]]:
     """The failed check, rule id and text, of a program whose largest error has grown; steps of step_mm are its rounding."""
     allowed = max((1.0 + WORSE_SHARE) * before_um, before_um + 1e3 * np.sqrt(3.0) * step_mm)

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from camcomp.compensation.program import arcs_out
-from camcomp.compensation.program.result import CycleTime, error_size
+from camcomp.compensation.program.control_account import ControlAccount, FarOff, PointsOnMoves
+from camcomp.compensation.program.result import CycleTime
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
-from camcomp.ground.source_lines import MOST_LINES, named_lines
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves, mode_columns, moves_of
@@ -33,33 +33,8 @@ if TYPE_CHECKING:
 LOST_TIME = 1.02  # factor of the cycle time from which a faster way is looked for
 
 
-@dataclass(frozen=True)
-class FarOff:
-    """Source lines on which the control goes further off than the tolerance, and how far: the worst ones."""
-
-    um: tuple[tuple[float, int], ...] = ()  # error and line, falling
-
-    def with_more(self, lines: Ints, um: Floats) -> FarOff:
-        """With errors (k,) of lines (k,)."""
-        worst = np.argsort(-um, kind="stable")
-        found: dict[int, float] = {line: size for size, line in self.um}
-        for line, size in zip(lines[worst].tolist(), um[worst].tolist(), strict=True):
-            if len(found) > MOST_LINES + len(self.um) and line not in found:
-                break
-            found[line] = max(size, found.get(line, 0.0))
-        return FarOff(tuple(sorted(((size, line) for line, size in found.items()), reverse=True)[: MOST_LINES + 1]))
-
-    def told(self, mode: str, what: str) -> list[str]:
-        """Warning of the contour error in this path mode; empty if it is small."""
-        if not self.um:
-            return []
-        lines = named_lines(sorted(line for _, line in self.um))
-        off = f"in {mode} the controller drives up to {self.um[0][0]:.1f} um off the written path{what}"
-        return [f"{off}, at {lines}; a smaller tolerance of the path mode reduces it"]
-
-
 def control_warnings(
-    modes: tuple[PathMode, ...], beside: FarOff, elsewhere: FarOff, *, exact_stop: str, resting: int,
+    modes: tuple[PathMode, ...], at_joins: FarOff, elsewhere: FarOff, *, exact_stop: str, resting: int,
     apart: Iterable[PathMode],
 ) -> list[str]:  # fmt: skip
     """Warnings about the controller.
@@ -73,7 +48,7 @@ def control_warnings(
         out.append(f"{exact_stop} is written {where}: the controller stops there instead of rounding; nothing to do")
     if all(each.stated for each in modes):
         mode = mode_name(modes)
-        out += beside.told(mode, " next to joining lines") + elsewhere.told(mode, "")
+        out += at_joins.warning(mode, " next to joining lines") + elsewhere.warning(mode, "")
     if said := ", ".join(mode.apart.name for mode in distinct(apart)):
         out.append(f"{said} is written around the cuts: the controller does not merge lines there; nothing to do")
     return out
@@ -84,14 +59,21 @@ class UnderControl:
     """Execution times and contour errors of a program under its controller."""
 
     before_s: float
-    after_s: float
     modes: tuple[PathMode, ...]  # of the cuts, in the order in which they come
-    error: Floats  # (k, 3) mm, at the points of `after`
-    joined: Bools  # (k,) beside a joining line
-    row: Ints  # (k,) end point to which the move leads on which a point lies
-    told: Floats  # (k, 3) mm, the points as commanded
+    points: PointsOnMoves  # (k,) those of `after`
+    account: ControlAccount  # of the written moves
     rest: Bools  # (N,) end points at which the control rests because of a joining line
     apart: bool = False  # lines are kept from being made one
+
+    @property
+    def error(self) -> Floats:
+        """Errors (k, 3) mm at the points."""
+        return self.account.latest
+
+    @property
+    def after_s(self) -> float:
+        """Execution time of the written program."""
+        return self.account.seconds
 
     @property
     def resting(self) -> int:
@@ -113,24 +95,22 @@ class UnderControl:
     @property
     def at_joins(self) -> float:
         """Largest error next to joining lines, mm."""
-        size = np.linalg.norm(self.error[self.joined], axis=1)
+        size = np.linalg.norm(self.error[self.points.joined], axis=1)
         return float(np.nanmax(size, initial=0.0))
 
     @property
     def off_joins(self) -> float:
         """Largest error apart from joining lines, mm."""
-        size = np.linalg.norm(self.error[~self.joined], axis=1)
+        size = np.linalg.norm(self.error[~self.points.joined], axis=1)
         return float(np.nanmax(size, initial=0.0))
 
-    def warnings(self, lines: Ints, tolerance_um: float, language: Dialect) -> list[str]:
-        """Warnings about the controller; lines (k,): source lines of the errors."""
-        size = 1e3 * np.linalg.norm(self.error, axis=1)
-        found = []
-        for of in (self.joined, ~self.joined):
-            far = of & (size > tolerance_um * (1.0 + 1e-9))
-            found.append(FarOff().with_more(lines[far], size[far]))
+    def warnings(self, language: Dialect) -> list[str]:
+        """Warnings about the controller."""
         apart = [mode for mode in self.modes if self.apart and merging(mode, language)]
-        return control_warnings(self.modes, *found, exact_stop=language.exact_stop, resting=self.resting, apart=apart)
+        return control_warnings(
+            self.modes, self.account.at_joins, self.account.elsewhere, exact_stop=language.exact_stop,
+            resting=self.resting, apart=apart,
+        )  # fmt: skip
 
     def leaves_room(self, tolerance_um: float) -> bool:
         """Whether another way to write the program might be faster or nearer to the path."""
@@ -201,30 +181,30 @@ def under_control(
     told: Floats,
     missed: Floats,
     rest: Bools,
+    tolerance_um: float,
     apart: Bools | None = None,
 ) -> UnderControl:
     """Plan a corrected program as its controller does.
 
     told, missed (k, 3) mm: written program and its tip errors at the points. rest, apart (N,): forced stops, unmerged lines.
+    tolerance_um: beyond which the controller is warned of.
     """
     path, limits = program.path, limits_of(job.config)
-    default = job.config.process.feed_mm_per_min or np.nan
-    feed = np.where(np.isnan(path.feed), default, path.feed)
-    before = plan_of(moves_of(path, program.modes, feed, program.per_turn), limits)
-    moves = written_moves(program, rows, written, default)
-    moves = replace(moves, exact=moves.exact | rest)
+    before = ControlAccount.of(programmed_moves(program, job), limits)
+    moves = written_moves(program, job, rows, written, rest)
     if apart is not None:
         moves = replace(moves, merge=np.where(apart, 0.0, moves.merge))
-    plan = plan_of(moves, limits)
     judged = np.flatnonzero(points.judged)
-    told, row = told[judged], points.row[judged]
+    row = points.row[judged]
     joining = np.concatenate((rows.joining, [False]))
-    beside = joining[row - 1] | joining[row + 1]
+    on_moves = PointsOnMoves(
+        move=row, commanded=told[judged], error=missed[judged], line=path.line[rows.motion[row]],
+        joined=joining[row - 1] | joining[row + 1],
+    )  # fmt: skip
     cuts = np.flatnonzero((path.kind != RAPID) & ~path.machine)
-    error = missed[judged] + plan.leaves_by(row, told)
     return UnderControl(
-        before_s=before.duration_s, after_s=plan.duration_s, modes=distinct(program.modes[k] for k in cuts),
-        error=error, joined=beside, row=row, told=told, rest=rest, apart=apart is not None,
+        before_s=before.seconds, modes=distinct(program.modes[k] for k in cuts), points=on_moves,
+        account=ControlAccount.of(moves, limits, 1e-3 * tolerance_um, on_moves), rest=rest, apart=apart is not None,
     )  # fmt: skip
 
 
@@ -247,8 +227,16 @@ def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:
     return tuple(dict.fromkeys(modes))
 
 
-def written_moves(program: Program, rows: CorrectedRows, written: Rewritten, feed: float) -> ToolMoves:
-    """The moves of a program that was corrected as they are written; feed: mm/min where none is in force."""
+def programmed_moves(program: Program, job: Job) -> ToolMoves:
+    """The moves of a program, with the feed of the machine file where none is in force."""
+    feed = program.path.feed
+    default = job.config.process.feed_mm_per_min or np.nan
+    return moves_of(program.path, program.modes, np.where(np.isnan(feed), default, feed), program.per_turn)
+
+
+def written_moves(program: Program, job: Job, rows: CorrectedRows, written: Rewritten, rest: Bools) -> ToolMoves:
+    """The moves of a program that was corrected as they are written, with stops at end points `rest` (N,)."""
+    feed = job.config.process.feed_mm_per_min or np.nan  # where none is in force
     path = program.path
     motion, arc = rows.motion, rows.kind == ARC
     bent = np.isfinite(written.centre[:, 0])
@@ -263,7 +251,7 @@ def written_moves(program: Program, rows: CorrectedRows, written: Rewritten, fee
     waits = np.asarray(path.waits)[motion] & (np.diff(motion, prepend=-1) > 0)
     return ToolMoves(
         kind=np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64), start=start, end=end,
-        centre=centre, axis=axis, angle=angle, feed=told, exact=exact[motion], waits=waits,
+        centre=centre, axis=axis, angle=angle, feed=told, exact=exact[motion] | rest, waits=waits,
         stop=(stop | path.machine)[motion], tolerance=tolerance[motion], merge=merged[motion],
         per_turn=program.per_turn[motion],
     )  # fmt: skip
@@ -276,18 +264,17 @@ def of_text(
 
     error (k, 3) mm: what the text of the corrected program leaves at points told (k, 3) mm on its moves (k,).
     """
-    config, limits = job.config, limits_of(job.config)
-    default = config.process.feed_mm_per_min or np.nan
-    plans = [
-        plan_of(
-            moves_of(each.path, each.modes, np.where(np.isnan(each.path.feed), default, each.path.feed), each.per_turn),
-            limits,
-        )
-        for each in (original, corrected)
+    limits = limits_of(job.config)
+    points = PointsOnMoves(
+        move=move, commanded=told, error=error, line=np.zeros(len(move), np.int64), joined=np.zeros(len(move), np.bool_)
+    )
+    accounts = [
+        ControlAccount.of(programmed_moves(original, job), limits),
+        ControlAccount.of(programmed_moves(corrected, job), limits, points=points),
     ]
     before, after = (
-        plan.duration_s + waiting_s(config, each.dwelt_s, each.tool_changes)
-        for plan, each in zip(plans, (original, corrected), strict=True)
+        account.seconds + waiting_s(job.config, each.dwelt_s, each.tool_changes)
+        for account, each in zip(accounts, (original, corrected), strict=True)
     )
     path = original.path
     modes = distinct(original.modes[k] for k in np.flatnonzero((path.kind != RAPID) & ~path.machine))
@@ -295,7 +282,7 @@ def of_text(
         "cycle_time_s": CycleTime(before=before, after=after),
         "control_mode": mode_name(modes),
         "control_mode_stated": all(each.stated for each in modes),
-        "under_control": error_size(error + plans[1].leaves_by(move, told)),
+        "under_control": accounts[1].errors.figures(),
     }
 
 

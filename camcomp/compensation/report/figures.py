@@ -69,7 +69,7 @@ def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
         target=rows.target, shift=1e3 * (result.written.end - rows.target),
         change=1e3 * (result.state.rho - result.nominal), drive=result.state.drive * drive_scale,
         before=largest(result.before, result.judged), after=largest(result.after, result.judged),
-        driven=largest(result.control.error, result.control.row), mode=mode_name(result.control.modes),
+        driven=largest(result.control.error, result.control.points.move), mode=mode_name(result.control.modes),
     )  # fmt: skip
 
 
