@@ -8,14 +8,11 @@ import gc
 import hashlib
 import os
 import signal
-import sys
 import tempfile
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-
-_MEASURED: set[Path] = set()  # files of which a test was traced
 
 
 def pytest_configure():
@@ -43,25 +40,6 @@ def turns():
     folder = Path(tempfile.gettempdir()) / f"camcomp-turns-{os.getuid()}-{checkout}"
     folder.mkdir(exist_ok=True)
     return folder
-
-
-@contextmanager
-def traced(item):
-    """Pause coverage.py but for the first unit test of each file, where tracing costs a third of the time of the test.
-
-    Python 3.12 and later report lines to coverage.py at no cost worth mentioning: there every test is measured.
-    """
-    coverage = getattr(sys.modules.get("coverage"), "Coverage", None)
-    running = coverage and coverage.current()
-    if not running or sys.version_info >= (3, 12) or ("unit" in item.path.parts and item.path not in _MEASURED):
-        _MEASURED.add(item.path)
-        yield
-        return
-    running.stop()
-    try:
-        yield
-    finally:
-        running.start()
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -101,5 +79,4 @@ def pytest_runtest_protocol(item):
     with ExitStack() as turn:
         with locked(folder / "door", kind):  # who waits for a turn of its own shuts it behind those that have one
             turn.enter_context(locked(folder / "turn", kind))
-        turn.enter_context(traced(item))
         return (yield)

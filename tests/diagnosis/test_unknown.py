@@ -36,6 +36,7 @@ def test_a_known_cause_is_named_beside_an_unknown_one(workshop):
     assert len(result["causes"]) == 2
 
 
+@pytest.mark.campaign  # a known cause beside an unknown one is in the plain run
 def test_after_an_unknown_effect_one_thing_is_changed_and_the_rest_left(workshop):
     result, diagnosis, _ = workshop.answer(CROSSTALK)
     assert result["next_experiment"]["separates"] == ["unknown"]

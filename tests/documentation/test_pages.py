@@ -17,7 +17,7 @@ FOLLOWED = sorted(
     path for path in DOCS.rglob("*.md") if any(isinstance(each, Command) for each in steps(path.read_text("utf-8")))
 )
 FOLLOWED += [ROOT / "samples/tutorial.md", ROOT / "samples/diagnosis/README.md"]
-SLOW = ("static-poses",)  # pages whose commands take a minute
+SLOW = ("next-experiment", "reports", "static-poses")  # pages whose commands take long; they are a campaign
 
 
 @pytest.fixture

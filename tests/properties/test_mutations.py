@@ -129,7 +129,7 @@ def test_machine_files(tmp_path, seed):
 
 def test_experiments(tmp_path):
     random = Random(5)
-    for _ in range(60):
+    for _ in range(30):
         data = mutated_text(random, (STUDY / "experiment.yaml").read_bytes())
         (tmp_path / "experiment.yaml").write_bytes(data)
         end_of(data, "validate", tmp_path / "experiment.yaml")
@@ -153,7 +153,7 @@ def test_logs(tmp_path):
 
 def test_robot_descriptions(tmp_path):
     random, ends = Random(7), set()
-    for number in range(80):
+    for number in range(40):
         data = mutated_markup(random, urdf())
         (tmp_path / "arm.urdf").write_bytes(data)
         folder = Path(tmp_path / str(number))

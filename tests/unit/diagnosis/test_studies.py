@@ -56,6 +56,7 @@ def known(result):
 FAULTS = {("link_length", "elbow"), ("gravity_compliance", "shoulder_lift")}
 
 
+@pytest.mark.campaign  # test_answers_on_poses has one in the plain run
 def test_a_longer_link_and_a_soft_joint_are_found_on_other_campaigns(robot, faulty):
     result = arm_study(robot, (), faulty, holdout=["B"], stated=STATED)
     assert result.verdict == "identified"
@@ -147,6 +148,7 @@ def test_a_disturbance_for_a_while_is_located_in_time(robot, faulty):
     assert all(i.t1_s > 90 and i.t0_s < 150 for i in result.where.intervals)
 
 
+@pytest.mark.campaign  # test_answers_on_poses has one in the plain run
 def test_beam_breaks_are_listed_and_not_fitted(robot, faulty):
     rows = {"A": [17, 120], "B": [3, 200]}
     runs = []

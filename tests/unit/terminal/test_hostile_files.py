@@ -222,7 +222,7 @@ def test_settings_with_which_numba_does_not_start(folder, way):
     assert done.returncode == 2 and "numba does not start" in done.stderr and "s3cret" not in done.stderr
 
 
-@pytest.mark.parametrize("far", ["XFD1048576", "A1048576", "XFD3"])
+@pytest.mark.parametrize("far", ["XFD1048576", pytest.param("A1048576", marks=pytest.mark.campaign), "XFD3"])
 def test_a_small_workbook_with_a_far_cell_takes_little_memory(folder, far):
     openpyxl = pytest.importorskip("openpyxl")
     from camcomp.diagnosis.recordings.xlsx_file import read_xlsx
