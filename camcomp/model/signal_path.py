@@ -58,6 +58,11 @@ def momentary(causes: Sequence[Cause]) -> bool:
     return all(getattr(cause.effect, "MOMENTARY", False) for cause in acting(causes, "drive"))
 
 
+def has_memory(causes: Sequence[Cause]) -> bool:
+    """Whether the response at a point depends on the points before it: control loops, and drives with a memory."""
+    return bool(acting(causes, "control")) or not momentary(causes)
+
+
 def controlled(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> Floats:
     """Encoders (n, m) of a motion whose encoders are still the set-points."""
     encoder = motion.encoder

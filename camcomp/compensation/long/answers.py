@@ -32,24 +32,32 @@ class InterpolatedMachine:
         self.machine, self._middle = machine, middle
         self._field: Field | None = None
         self._exact = 0
+        self._nominal: tuple[Floats, Floats, Ints] | None = None  # the latest tips, their set-points and tiles
 
-    def solve(self, mode: int, near: Floats, force: Floats, rho: Floats | None) -> State:
-        """Solved points (n,) as `solve` has them, in FREE or TARGET; where no cube is good enough, solved exactly."""
+    def solve(self, mode: int, near: Floats, force: Floats, rho: Floats | None, *, tips_only: bool = False) -> State:
+        """Solved points (n,) as `solve` has them, in FREE or TARGET; where no cube is good enough, solved exactly.
+
+        tips_only: drive and tilt may be zero in FREE.
+        """
         known, n, m = self._known(force), len(near), len(self.machine.actuators)
-        answer, nominal, tile = known.look(near, force)
-        tip, commanded = near, near + answer[:, :3]
-        if mode != TARGET:
-            commanded = near
-            if rho is not None:
-                commanded = _tips(known, rho, near, nominal, tile)
-                answer, _, within = known.look(commanded, force, every=False)
-                tile = np.minimum(tile, within)
-            tip = commanded + answer[:, 3:6]
-            answer, _, inside = known.look(tip, force)
-            tile = np.minimum(tile, inside)
-            own = nominal if rho is None else rho
+        tip = commanded = near
+        if rho is not None:
+            nominal, tile = self._nominals(near, force)
+            own, commanded = rho, _tips(known, rho, near, nominal, tile)
+            answer, _, within = known.look(commanded, force, every=False)
+            tile = np.minimum(tile, within)
         else:
-            own = nominal + answer[:, 9 + m :]
+            answer, nominal, tile = known.look(near, force)
+            own = nominal
+        if mode == TARGET:
+            commanded, own = near + answer[:, :3], nominal + answer[:, 9 + m :]
+        else:
+            tip = commanded + answer[:, 3:6]
+            if tips_only:
+                answer = np.zeros((n, 9 + m))
+            else:
+                answer, _, inside = known.look(tip, force)
+                tile = np.minimum(tile, inside)
         held = np.broadcast_to(self.machine.nominal.held_rotation, (n, 3, 3))
         out = State(
             tip=tip, rotation=held, tilt=answer[:, 6:9], commanded=near if mode != TARGET else commanded, rho=own,
@@ -61,11 +69,19 @@ class InterpolatedMachine:
 
     def set_points(self, tip: Floats, force: Floats) -> Floats:
         """Set-points (n, m) of commanded tips (n, 3); force (n, 3): that acts there."""
-        _, out, tile = self._known(force).look(tip, None)
+        out, tile = self._nominals(tip, force)
         lost = np.flatnonzero(tile < 0)
         if len(lost):
+            out = out.copy()
             out[lost] = inverse(self.machine, tip[lost])
         return out
+
+    def _nominals(self, tip: Floats, force: Floats) -> tuple[Floats, Ints]:
+        """Set-points (n, m) of tips (n, 3), and tiles (n,); once for each array of tips."""
+        if self._nominal is None or self._nominal[0] is not tip:
+            _, out, tile = self._known(force).look(tip, None)
+            self._nominal = tip, out, tile
+        return self._nominal[1:]
 
     def _known(self, force: Floats) -> Field:
         if self._field is None:

@@ -60,6 +60,7 @@ from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import acting_force, aim_at
+from camcomp.model.signal_path import has_memory
 from camcomp.model.statics.target import Correction, settle
 from camcomp.model.stock.warnings import stock_remarks, stock_warnings
 
@@ -214,14 +215,19 @@ class _Correction:
         self.feeding = self.corrected & (program.path.kind[track.motion] != RAPID)
         if self.part is not None:
             self.feeding &= (track.motion >= self.part.first) & (track.motion < self.part.last)
-        self._try(turning | self.pushed, spacing)
+        self.turning, self.spacing = turning | self.pushed, spacing
+        simple = self.shares is None and self.orienting is None
+        self.by_ends = (track.angle == 0.0) & (track.length <= spacing) & simple
+        self._try()
 
-    def _try(self, turning: Bools, spacing: float) -> None:
-        """Solve trial points `spacing` mm apart: how the commanded path bends, and which error a piece may keep."""
+    def _try(self) -> None:
+        """Solve trial points `spacing` mm apart: how the commanded path bends, and which error a piece may keep.
+
+        Short lines are tried at their ends; those whose middle then shows a bend are tried again.
+        """
         track = self.track
-        self.trial = trial = trial_nodes(
-            track.length, track.angle, self.feeding & ~turning & (track.length > 0.0), spacing
-        )
+        inner = self.feeding & ~self.turning & (track.length > 0.0) & ~self.by_ends
+        self.trial = trial = trial_nodes(track.length, track.angle, inner, self.spacing)
         with part_of_work(0.0, 0.4, points=True):
             self.aimed = self._aim(trial)
         curve = self.aimed.commanded
@@ -237,18 +243,18 @@ class _Correction:
         self.budget = chord_budget(self.goal, self.step)
         if self.shares is not None:
             self.goal *= WITH_SHARES
-        self.whole = self.kept | turning  # pieces that are not divided
+        self.whole = self.kept | self.turning  # pieces that are not divided
 
     def _aim(self, nodes: Nodes) -> _Aimed:
         """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
         job, track, orienting, on = self.job, self.track, self.orienting, self.corrected[nodes.piece]
-        piece, w = nodes.piece[on], nodes.w[on]
+        piece, w, of = self._once(nodes.piece[on], nodes.w[on])
         rapids = np.flatnonzero(self.corrected & (track.path.kind[track.motion] == RAPID) & (track.length > 0.0))
         if not job.causes:
             rapids = rapids[:0]
         between, at = np.repeat(rapids, len(WITHIN_RAPID)), np.tile(WITHIN_RAPID, len(rapids))
         order = np.lexsort((np.concatenate((w, at)), np.concatenate((piece, between))))  # drives remember their turns
-        asked = np.argsort(order, kind="stable")[: len(piece)]
+        asked = np.argsort(order, kind="stable")[: len(piece)][of]
         piece, w = np.concatenate((piece, between))[order], np.concatenate((w, at))[order]
         target, travel = track.points(piece, w), travel_of(job, track, piece, w)
         words = np.zeros((len(nodes.piece), 3))
@@ -265,35 +271,79 @@ class _Correction:
             out = self.shares.taken(track, nodes.piece, nodes.w, track.points(nodes.piece, nodes.w), out)
         return _Aimed(out, int(result.iterations[asked].max(initial=0)), words)
 
+    def _aim_at_others(self, nodes: Nodes) -> _Aimed:
+        """`_aim`, where drives have no memory without those nodes that were trial points."""
+        trial, known = self.trial, self.aimed
+        key, other = 2.0 * trial.piece + trial.w, 2.0 * nodes.piece + nodes.w
+        at = np.minimum(np.searchsorted(key, other), max(len(key) - 1, 0))
+        fresh = np.flatnonzero(key[at] != other) if len(key) else np.arange(len(other))
+        if not has_memory(self.job.causes) and self.orienting is None:
+            nodes = Nodes(nodes.piece[fresh], nodes.w[fresh], nodes.first)
+        elif not len(fresh) and len(key) == len(other):
+            return known
+        else:
+            return self._aim(nodes)
+        found, commanded = self._aim(nodes), known.commanded[at]
+        commanded[fresh] = found.commanded
+        return _Aimed(commanded, max(known.iterations, found.iterations), np.zeros_like(commanded))
+
+    def _once(self, piece: Ints, w: Floats) -> tuple[Ints, Floats, Ints]:
+        """Nodes (k,) without those at which a piece goes on smoothly from the one before, and which (n,) stands for each."""
+        track = self.track
+        again = np.zeros(len(piece), np.bool_)
+        if self.orienting is None and len(piece):
+            here = piece[1:]
+            again[1:] = (w[1:] == 0.0) & (w[:-1] == 1.0) & (here == piece[:-1] + 1)
+            again[1:] &= ~(track.jump | track.corner)[here]
+        return piece[~again], w[~again], np.cumsum(~again) - 1
+
     # --- division ------------------------------------------------------------------------------------------------
 
     def _divided(self, arcs: bool) -> _Division:
         """Divide finer and finer, until the written program keeps its goals or a finer division is no use."""
-        trial, budget, goal = self.trial, self.budget, self.goal
         bend, tolerance = self._bend(arcs)
         last, last_count = np.full(len(tolerance), np.inf), np.zeros(len(tolerance), np.int64)
-        for round_ in range(MAX_ROUNDS):
-            nodes, shift = bend.divided(trial, tolerance)
+        round_ = 0
+        while True:
+            nodes, shift = bend.divided(self.trial, tolerance)
             if (gone := bend.pointless(nodes)).any():
                 bend.use &= ~gone
-                tolerance[gone] = budget[gone]
-                nodes, shift = bend.divided(trial, tolerance)
+                tolerance[gone] = self.budget[gone]
+                nodes, shift = bend.divided(self.trial, tolerance)
             with part_of_work(1.0 - 0.6 * 0.5**round_, 1.0 - 0.35 * 0.5**round_, points=True):
                 commanded, circles, words = self._bent(nodes, shift, bend)
             found = self._written(nodes, commanded, circles, words)
-            missed = (found.worst > goal) & ~self.kept
+            missed = (found.worst > self.goal) & ~self.kept
+            finer = tolerance * np.clip(0.9 * self.goal / np.maximum(found.worst, 1e-12), 0.3, 0.9)
+            sagging = self._sagging(found)
+            if (unseen := self.by_ends & (missed | sagging)).any():
+                self.by_ends &= ~unseen
+                self._try()
+                bend, tolerance = self._bend(arcs)
+                tolerance = np.where(unseen & ~sagging, np.minimum(finer, tolerance), tolerance)
+                continue
             count = np.diff(nodes.first)
             stuck = missed & (found.worst >= STUCK * last) & (count > last_count)
             straighten = missed & bend.use & (stuck | (round_ >= ARC_ROUNDS - 1))
             missed &= ~stuck & ~straighten
-            if not (missed | straighten).any():
+            round_ += 1
+            if not (missed | straighten).any() or round_ == MAX_ROUNDS:
                 break
             last, last_count = np.where(straighten, np.inf, found.worst), count
             bend.use &= ~straighten
-            tolerance[straighten] = budget[straighten]
-            finer = tolerance * np.clip(0.9 * goal / np.maximum(found.worst, 1e-12), 0.3, 0.9)
+            tolerance[straighten] = self.budget[straighten]
             tolerance = np.where(missed, finer, tolerance)
         return found
+
+    def _sagging(self, found: _Division) -> Bools:
+        """Pieces (p,) tried at their ends whose middle lies further off the line between them than its chord may."""
+        points, error = found.points, found.after.error
+        at = np.flatnonzero((points.fraction == 0.5) & points.judged & (points.row > 0) & self.by_ends[points.piece])
+        end, row, piece = np.flatnonzero(points.end), points.row[at], points.piece[at]
+        sag = np.linalg.norm(error[at] - 0.5 * (error[end[row - 1]] + error[end[row]]), axis=1)
+        out = np.zeros(len(self.by_ends), np.bool_)
+        out[piece[sag > self.budget[piece]]] = True
+        return out & ~self.whole
 
     def _bend(self, arcs: bool) -> tuple[Bend, Floats]:
         """What pieces are divided for, and chords' tolerances (p,) mm."""
@@ -314,7 +364,7 @@ class _Correction:
         """
         track = self.track
         both, middle = arcs_out.middles(nodes, bend.use)
-        aimed = self._aim(both)
+        aimed = self._aim_at_others(both)
         solved = aimed.commanded
         commanded = solved[~middle] + shift[:, :3]
         circles = Arcs.none(len(commanded))

@@ -130,7 +130,7 @@ def _seen(points: JudgedPoints, tip: Floats, state: Correction, tilt: Floats | N
 
 def see_original(job: Job, points: JudgedPoints) -> Seen:
     """The original program through the full model, at the same points."""
-    tip, state = respond(job, points.target, points.travel, before=points.before)
+    tip, state = respond(job, points.target, points.travel, before=points.before, tips_only=True)
     return _seen(points, tip, state)
 
 

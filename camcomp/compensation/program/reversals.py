@@ -19,6 +19,7 @@ from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import turning_points
 from camcomp.model.job import Job
 from camcomp.model.motion.response import LEAST_MM, WORDS, plays, way_per_unit, winds_up, without_drives
+from camcomp.model.signal_path import momentary
 
 STANDING_MM = 2e-4  # way that the carriage should have gone at the end of such a line
 WINDING_MM = (
@@ -36,7 +37,7 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
     """
     none = np.zeros(len(track.motion), np.bool_)
     corrected = corrected_pieces(track.path, track)
-    if not job.causes or not corrected.any():
+    if momentary(job.causes) or not corrected.any():
         return track, none
     trial = trial_nodes(track.length, track.angle, corrected & (track.length > 0.0), spacing)
     on = corrected[trial.piece]

@@ -74,13 +74,14 @@ class Travel:
 
 def respond(
     job: Job, commanded: Floats, travel: Travel, nominal_of: Floats | None = None, *, before: Floats | None = None,
-    rho: Floats | None = None,
+    rho: Floats | None = None, tips_only: bool = False,
 ) -> tuple[Floats, Correction]:  # fmt: skip
     """Loaded tips (n, 3) of commanded tips (n, 3), both in the program frame, and the states of the machine.
 
     nominal_of (n, 3): tips whose inverse kinematics go into rho_nominal of the states; the commanded ones by default.
     before (3,): commanded tip before the first one; the memory of drives depends on it.
     rho (n, m): set-points of the actuators; those that the control computes from the commanded tips by default.
+    tips_only: drive and tilt of the states are not used.
     """
     if before is not None and job.causes and len(commanded):
         rows = np.concatenate(([0], np.arange(len(commanded))))
@@ -88,12 +89,16 @@ def respond(
         if rho is not None:
             begin = inverse(job.real_machine, job.frame.to_machine(before[None]))
             rho = np.concatenate((begin, rho))
-        tip, found = respond(job, np.concatenate((before[None], commanded)), travel.take(rows), other, rho=rho)
+        tip, found = respond(
+            job, np.concatenate((before[None], commanded)), travel.take(rows), other, rho=rho, tips_only=tips_only
+        )
         return tip[1:], Correction(**{each.name: getattr(found, each.name)[1:] for each in fields(found)})
     told = job.frame.to_machine(commanded)
     aim = None if nominal_of is None else job.frame.to_machine(nominal_of)
     if not job.causes:
-        loaded, settled = settle(job.real_machine, told, travel.force, None, aim, rotation=travel.rotation)
+        loaded, settled = settle(
+            job.real_machine, told, travel.force, None, aim, rotation=travel.rotation, tips_only=tips_only
+        )
         return _finite(job, job.frame.to_program(loaded), settled)
     nominal = _set_points(job, told, travel)
     setpoint = nominal if rho is None else rho
@@ -109,8 +114,9 @@ def respond(
     load = loading()
     carriage = motion.encoder + error
     state = solve(
-        job.real_machine, FREE, told, aim_rotation=travel.rotation, force=load.force, wrench=load.wrench, rho=carriage
-    )
+        job.real_machine, FREE, told, aim_rotation=travel.rotation, force=load.force, wrench=load.wrench, rho=carriage,
+        tips_only=tips_only,
+    )  # fmt: skip
     drive = state.drive if effort is None else state.drive + effort
     grown = signal_path.grown(job.causes, job.real_machine.actuators, motion)
     tip = state.tip + _lengthening(job, told, grown, travel.rotation)
@@ -196,7 +202,7 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
         rings = bool(signal_path.acting(job.causes, "control"))
         near_target = target if has_moved_mass(job.real_machine.robot) else None  # masses move with the target
         for _ in range(MAX_AIM_STEPS):
-            tip, state = respond(job, commanded, travel, near_target)
+            tip, state = respond(job, commanded, travel, near_target, tips_only=True)
             left = target - tip
             size = float(np.nansum(left**2))
             if rings and size > FARTHER * least:  # an oscillating loop overshoots

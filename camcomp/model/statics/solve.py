@@ -104,17 +104,18 @@ def solve(
     rho: Array | None = None,
     check: bool = True,
     keep: bool = False,
+    tips_only: bool = False,
 ) -> State:
     """Solves every point in one of the modes of camcomp.statics.point.
 
     near (n, 3): a tip position near the answer (its nominal joint coordinates start the solver). force (n, 3) at the
     tip, wrench (n, 6) at the platform reference. rho (n, m) commanded in FREE, HOLD and CLAMP; default: the set-points of
-    `near`. check: verify stability.
+    `near`. check: verify stability. tips_only: drive and tilt of the result are not used.
     """
     n, m = len(near), len(machine.actuators)
     able = aim is None and aim_rotation is None and check and not keep and (wrench is None or not np.any(wrench))
     if machine.answers is not None and mode in (FREE, TARGET) and able:
-        return machine.answers.solve(mode, near, _per_point(force, n, (3,)), rho)  # type: ignore[no-any-return]
+        return machine.answers.solve(mode, near, _per_point(force, n, (3,)), rho, tips_only=tips_only)  # type: ignore[no-any-return]
     tool = np.ascontiguousarray(machine.robot.tool, float)
     aim = np.ascontiguousarray(near if aim is None else aim, float)
     near, R_near, R_aim = _starts_and_aims(machine, mode, near, aim_rotation)

@@ -100,13 +100,14 @@ def _why(machine: Machine, state: State) -> NDArray[np.int64]:
 
 def settle(
     machine: Machine, commanded: Array, force: Array, wrench: Array | None = None, aim: Array | None = None, *,
-    rotation: Array | None = None,
+    rotation: Array | None = None, tips_only: bool = False,
 ) -> tuple[Array, Correction]:  # fmt: skip
     """Loaded tips (n, 3) of commanded tips, tF = f^-1(F | t0) (eq. 1), and the states as corrections of `aim`.
 
-    rotation (n, 3, 3): commanded orientation of the platform; None: the one that the machine holds.
+    rotation (n, 3, 3): commanded orientation of the platform; None: the one that the machine holds. tips_only: drive and
+    tilt are not used.
     """
-    state = solve(machine, FREE, commanded, aim_rotation=rotation, force=force, wrench=wrench)
+    state = solve(machine, FREE, commanded, aim_rotation=rotation, force=force, wrench=wrench, tips_only=tips_only)
     rho_nominal = state.rho_nominal
     if aim is not None:
         rho_nominal = inverse(machine, aim, rotation)

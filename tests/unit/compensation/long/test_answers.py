@@ -67,7 +67,7 @@ def test_a_sample_too_far_from_its_exact_solutions_fails_the_program(job, progra
     monkeypatch.setattr(answers_module, "LEAST_MOTIONS", 500)
     whole = answers_module.InterpolatedMachine.solve
 
-    def bent(self, mode, near, force, rho):
+    def bent(self, mode, near, force, rho, **how):
         found = whole(self, mode, near, force, rho)
         found.commanded[:] += 1e-4 * (mode == TARGET)
         return found
