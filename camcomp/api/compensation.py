@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Literal
 from camcomp import __version__
 from camcomp.api.machine import Job, Program, load_machine, program_in
 from camcomp.api.result_table import ResultTable
-from camcomp.compensation.program import compensate as story
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.result import Summary
 from camcomp.compensation.program.totals import Totals
@@ -78,7 +77,9 @@ class CompensatedProgram:
 
     def paths_file(self) -> bytes:
         """The five trajectories as CSV."""
-        return tables.paths_csv(self.outcome, story.trajectories(self.outcome, self.machine))
+        from camcomp.compensation.program.trajectories import trajectories
+
+        return tables.paths_csv(self.outcome, trajectories(self.outcome, self.machine))
 
     def report(self, inputs: Sequence[Input] = ()) -> bytes:
         """One HTML page with plots. Raises ConfigError CC216 without the plot library."""

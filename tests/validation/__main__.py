@@ -14,7 +14,7 @@ from pathlib import Path
 
 import click
 
-from tests.validation import calibration, counting, report, store
+from tests.validation import calibration, counting, report, speed, store
 from tests.validation.generators import FIRST, GENERATORS, seed_rows
 from tests.validation.measured import bench
 
@@ -25,7 +25,7 @@ def main() -> None:
 
 
 @main.command("run")
-@click.argument("name", type=click.Choice([*GENERATORS, "measured"]))
+@click.argument("name", type=click.Choice([*GENERATORS, "measured", "speed"]))
 @click.option("--count", default=20, help="Experiments of this code in all, those stored included.")
 @click.option("--minutes", type=float, help="Begin no experiment after that.")
 @click.option("--processes", default=1)
@@ -33,6 +33,9 @@ def main() -> None:
 @click.option("--again", is_flag=True, help="measured: ask anew what this code was asked before.")
 def run(name: str, count: int, minutes: float | None, processes: int, only: tuple[str, ...], again: bool) -> None:
     """Run a generator on the code of this checkout; a second run goes on where the first one stopped."""
+    if name == "speed":
+        speed.measure(times=3)
+        return
     if name == "measured":
         _measured(only, again)
         return

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from tests.validation import counting, store
+from tests.validation import counting, speed, store
 from tests.validation.generators import GENERATORS, WANTED
 from tests.validation.runner import ROOT
 from tests.validation.scoring import wilson
@@ -32,6 +32,7 @@ table is of one code. Rates come with Wilson intervals of 95 %.
 {rows}
 {measured}"""
 LINK = "\n[Measured data](measured.md): real machines, judged on runs that the fit has not seen, with textbook models on the same split.\n"
+TIMED = "\n[Speed](speed.md): time per line of programs of 10 to 10 000 000 lines.\n"
 PAGE = """# {title}
 
 {about}
@@ -221,9 +222,11 @@ def pages() -> dict[Path, str]:
     on_real = store.all_of("measured")
     if on_real:
         out[PAGES / "measured.md"] = measured(on_real[-1])
-    out[PAGES / "index.md"] = INDEX.format(
-        lines="\n".join(readme_lines()), rows="\n".join(rows), measured=LINK if on_real else ""
-    )
+    links = LINK if on_real else ""
+    if timed := store.all_of("speed"):
+        out[PAGES / "speed.md"], out[PAGES / "speed.svg"] = speed.page(timed[-1]), speed.plot(timed[-1])
+        links += TIMED
+    out[PAGES / "index.md"] = INDEX.format(lines="\n".join(readme_lines()), rows="\n".join(rows), measured=links)
     return out
 
 

@@ -26,6 +26,12 @@ class Nodes:
     w: Floats
     first: Ints
 
+    def among(self, others: Nodes) -> tuple[Ints, Ints]:
+        """Which of others (m >= 1,) each node (k,) is, and the nodes that are none of them."""
+        known, own = 2.0 * others.piece + others.w, 2.0 * self.piece + self.w
+        at = np.minimum(np.searchsorted(known, own), len(known) - 1)
+        return at, np.flatnonzero(known[at] != own)
+
 
 def trial_nodes(length: Floats, angle: Floats, divide: np.ndarray, spacing: float = 8.0) -> Nodes:
     """At least three nodes where `divide`, one every `spacing` mm of length (p,) and 15 degrees of arc (p,); two elsewhere."""

@@ -33,6 +33,7 @@ from camcomp.compensation.program.moves import (
     error_goals,
     refuse_unsolved,
     travel_of,
+    without_shared_ends,
 )
 from camcomp.compensation.program.orienting import MOST_TILT_RAD, Orienting, refuse_unfollowed
 from camcomp.compensation.program.policy import shares_of
@@ -61,7 +62,7 @@ from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import acting_force, aim_at
 from camcomp.model.signal_path import has_memory
-from camcomp.model.statics.target import Correction, settle
+from camcomp.model.statics.target import Correction
 from camcomp.model.stock.warnings import stock_remarks, stock_warnings
 
 MAX_ROUNDS, ARC_ROUNDS = 6, 4
@@ -117,24 +118,6 @@ class Compensated:
     def lines(self) -> Ints:
         """Source line (N,) of every end point."""
         return self.program.path.line[self.rows.motion]
-
-
-@dataclass(frozen=True, eq=False)
-class Trajectories:
-    """Where the original program takes the tip (N, 3) mm, program frame, for one cause at a time: seed Fig. 4."""
-
-    chain_error: Floats  # imperfect chains, no load
-    force: Floats  # perfect chains, cutting force
-
-
-def trajectories(result: Compensated, job: Job) -> Trajectories:
-    """The trajectories of the original program that a compensation does not need itself."""
-    target = job.frame.to_machine(result.rows.target)
-    force = job.frame.vectors(result.rows.force)
-    rotation = None if result.orienting is None else result.orienting.platform(result.programmed_words)
-    alone, _ = settle(job.real_machine, target, np.zeros_like(force), rotation=rotation)
-    loaded, _ = settle(job.perfect_machine, target, force, rotation=rotation)
-    return Trajectories(job.frame.to_program(alone), job.frame.to_program(loaded))
 
 
 def compensate(
@@ -248,7 +231,9 @@ class _Correction:
     def _aim(self, nodes: Nodes) -> _Aimed:
         """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
         job, track, orienting, on = self.job, self.track, self.orienting, self.corrected[nodes.piece]
-        piece, w, of = self._once(nodes.piece[on], nodes.w[on])
+        piece, w, of = nodes.piece[on], nodes.w[on], np.arange(int(on.sum()))
+        if orienting is None:
+            piece, w, of = without_shared_ends(track, piece, w)
         rapids = np.flatnonzero(self.corrected & (track.path.kind[track.motion] == RAPID) & (track.length > 0.0))
         if not job.causes:
             rapids = rapids[:0]
@@ -273,29 +258,15 @@ class _Correction:
 
     def _aim_at_others(self, nodes: Nodes) -> _Aimed:
         """`_aim`, where drives have no memory without those nodes that were trial points."""
-        trial, known = self.trial, self.aimed
-        key, other = 2.0 * trial.piece + trial.w, 2.0 * nodes.piece + nodes.w
-        at = np.minimum(np.searchsorted(key, other), max(len(key) - 1, 0))
-        fresh = np.flatnonzero(key[at] != other) if len(key) else np.arange(len(other))
-        if not has_memory(self.job.causes) and self.orienting is None:
-            nodes = Nodes(nodes.piece[fresh], nodes.w[fresh], nodes.first)
-        elif not len(fresh) and len(key) == len(other):
+        known = self.aimed
+        at, fresh = nodes.among(self.trial)
+        if not len(fresh) and len(nodes.w) == len(self.trial.w):
             return known
-        else:
+        if has_memory(self.job.causes) or self.orienting is not None:
             return self._aim(nodes)
-        found, commanded = self._aim(nodes), known.commanded[at]
+        found, commanded = self._aim(Nodes(nodes.piece[fresh], nodes.w[fresh], nodes.first)), known.commanded[at]
         commanded[fresh] = found.commanded
         return _Aimed(commanded, max(known.iterations, found.iterations), np.zeros_like(commanded))
-
-    def _once(self, piece: Ints, w: Floats) -> tuple[Ints, Floats, Ints]:
-        """Nodes (k,) without those at which a piece goes on smoothly from the one before, and which (n,) stands for each."""
-        track = self.track
-        again = np.zeros(len(piece), np.bool_)
-        if self.orienting is None and len(piece):
-            here = piece[1:]
-            again[1:] = (w[1:] == 0.0) & (w[:-1] == 1.0) & (here == piece[:-1] + 1)
-            again[1:] &= ~(track.jump | track.corner)[here]
-        return piece[~again], w[~again], np.cumsum(~again) - 1
 
     # --- division ------------------------------------------------------------------------------------------------
 
@@ -315,7 +286,7 @@ class _Correction:
             found = self._written(nodes, commanded, circles, words)
             missed = (found.worst > self.goal) & ~self.kept
             finer = tolerance * np.clip(0.9 * self.goal / np.maximum(found.worst, 1e-12), 0.3, 0.9)
-            sagging = self._sagging(found)
+            sagging = (found.points.sags(found.after.error, len(missed)) > self.budget) & ~self.whole
             if (unseen := self.by_ends & (missed | sagging)).any():
                 self.by_ends &= ~unseen
                 self._try()
@@ -334,16 +305,6 @@ class _Correction:
             tolerance[straighten] = self.budget[straighten]
             tolerance = np.where(missed, finer, tolerance)
         return found
-
-    def _sagging(self, found: _Division) -> Bools:
-        """Pieces (p,) tried at their ends whose middle lies further off the line between them than its chord may."""
-        points, error = found.points, found.after.error
-        at = np.flatnonzero((points.fraction == 0.5) & points.judged & (points.row > 0) & self.by_ends[points.piece])
-        end, row, piece = np.flatnonzero(points.end), points.row[at], points.piece[at]
-        sag = np.linalg.norm(error[at] - 0.5 * (error[end[row - 1]] + error[end[row]]), axis=1)
-        out = np.zeros(len(self.by_ends), np.bool_)
-        out[piece[sag > self.budget[piece]]] = True
-        return out & ~self.whole
 
     def _bend(self, arcs: bool) -> tuple[Bend, Floats]:
         """What pieces are divided for, and chords' tolerances (p,) mm."""

@@ -43,6 +43,15 @@ class JudgedPoints:
         out: Bools = self.fraction == 1.0
         return out
 
+    def sags(self, error: Floats, pieces: int) -> Floats:
+        """How far (mm) in each piece (pieces,) errors (k, 3) at the middles of lines lie off the mean of those at their ends."""
+        at = np.flatnonzero((self.fraction == 0.5) & self.judged & (self.row > 0))
+        end, row = np.flatnonzero(self.end), self.row[at]
+        sag = np.linalg.norm(error[at] - 0.5 * (error[end[row - 1]] + error[end[row]]), axis=1)
+        out = np.zeros(pieces)
+        np.fmax.at(out, self.piece[at], sag)
+        return out
+
     def along(self, ends: Floats, arcs: Arcs) -> Floats:
         """Points (k, 3) of the moves between end points (N, 3)."""
         first = ends[:1] if self.before is None else self.before[None]

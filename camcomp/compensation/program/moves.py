@@ -107,6 +107,18 @@ def _place(program: Program, motion: int) -> Location:
     return program.text.place(row, max(column, 0))
 
 
+def without_shared_ends(track: Track, piece: Ints, w: Floats) -> tuple[Ints, Floats, Ints]:
+    """Points (k,) of a track without the starts of pieces that go on smoothly from the end before, and which stands for each.
+
+    piece, w (n,): points in the order of travel. The third result (n,) counts the points that are left.
+    """
+    again = np.zeros(len(piece), np.bool_)
+    if len(piece):
+        here = piece[1:]
+        again[1:] = (w[1:] == 0.0) & (w[:-1] == 1.0) & (here == piece[:-1] + 1) & ~(track.jump | track.corner)[here]
+    return piece[~again], w[~again], np.cumsum(~again) - 1
+
+
 def travel_of(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
     """Force and time of points in the order of travel. Rapids go at RAPID_FEED where the time matters."""
     feed = track.path.feed[track.motion]

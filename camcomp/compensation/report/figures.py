@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.compensation.program.compensate import Compensated, Trajectories
+from camcomp.compensation.program.compensate import Compensated
+from camcomp.compensation.program.trajectories import Trajectories
 from camcomp.compensation.program.under_control import mode_name
 from camcomp.compensation.program.verify import Verified
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints

@@ -7,9 +7,10 @@ from pathlib import PurePath
 
 import numpy as np
 
-from camcomp.compensation.program.compensate import Compensated, trajectories
+from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.result import LineResult, Summary
 from camcomp.compensation.program.totals import Totals
+from camcomp.compensation.program.trajectories import trajectories
 from camcomp.compensation.program.verify import Verified, verify
 from camcomp.compensation.report.band_section import band_section
 from camcomp.compensation.report.figures import (

@@ -11,8 +11,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from camcomp.compensation.program.compensate import Compensated, Trajectories
+from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.totals import JointTableRows, Totals
+from camcomp.compensation.program.trajectories import Trajectories
 from camcomp.gcode.linear_rows import csv_rows
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError
