@@ -39,6 +39,7 @@ _CREEPS = 0.05  # of the cutting speed: a slower mean speed over missing rows me
 _SAME_FEED = 0.03  # relative tolerance of driven against programmed feed
 LEAST_FEED = 1e-3  # mm/min, in place of zero
 _RESTS = 1e-3  # of the longest step between two rows: two shorter steps in succession are a standstill
+_STEEP = np.cos(0.2)  # cosine of the angle to the tool axis below which a motion has no direction across it
 _CHORD_MM = 0.02  # length over which a direction is taken: large against digits and noise of set-points
 
 
@@ -191,7 +192,7 @@ def cutting_forces(
     # line numbers corrected for their lag are exact to one row
     slack = CLOCK_S + (float(np.median(np.diff(time))) if aligned.lag else 0.0)
     return Forces(
-        force, np.maximum(_doubt(force, time, on, slack), turning), on, _apart(track, motion) | _waited(tip, time, on)
+        force, np.maximum(_doubt(force, middle, time, on, slack), turning), on, _apart(track, motion) | _waited(tip, time, on)
     )
 
 
@@ -342,16 +343,28 @@ def _piece_of(track: Track, motion: Ints, share: Floats) -> Ints:
     return np.clip(np.searchsorted(track.motion + track.u0, key, side="right") - 1, 0, len(track.motion) - 1)
 
 
-def _doubt(force: Floats, time: Floats, cutting: Bools, slack: float) -> Floats:
-    """Error bound (n, 3) of the force at jumps between rows: half the jump, for rows within the clock offset."""
+def _doubt(force: Floats, direction: Floats, time: Floats, cutting: Bools, slack: float) -> Floats:
+    """Error bound (n, 3) of the force at jumps between rows: half the jump, for rows within the clock offset.
+
+    A force that reverses on a motion in one direction (n, 3) is that of a motion along the tool axis: the direction across it
+    stays unknown for as long as the motion does.
+    """
     change = np.diff(force, axis=0)
     size = np.linalg.norm(change, axis=1)
     out = np.zeros_like(force)
     for k in np.flatnonzero(_abrupt(size, force) | np.diff(cutting)):
         near = (time >= time[k] - slack) & (time <= time[k + 1] + slack)
         near[k : k + 2] = True
+        if force[k] @ force[k + 1] < 0.0:
+            near |= _stretch(direction @ direction[k] > _STEEP, k)
         out[near] = np.maximum(out[near], np.abs(change[k]))
     return out
+
+
+def _stretch(mask: Bools, k: int) -> Bools:
+    """The rows (n,) of a mask that are next to each other and to row k."""
+    part = np.cumsum(np.diff(mask, prepend=False))
+    return np.asarray(mask & (part == part[k]))
 
 
 def _abrupt(size: Floats, force: Floats) -> Bools:

@@ -1,4 +1,4 @@
-"""The force on a tool that a feed hold stops in its cut is not determined: its edges rub, and no chip says which way."""
+"""The force on a tool that stops in its cut, or moves along its axis, is not determined: no chip says which way."""
 
 import numpy as np
 import pytest
@@ -48,3 +48,21 @@ def test_what_creeps_is_on_its_way(mm_per_s):
     time = ROW_S * np.arange(500)
     tip = np.random.default_rng(6).normal(0.0, 0.002, (500, 3)) + mm_per_s * time[:, None] * [0.6, 0.0, -0.8]
     assert np.array_equal(_held_at_rest(tip, time), tip)
+
+
+def test_the_direction_of_a_force_is_unknown_for_as_long_as_the_tool_moves_along_its_axis(tmp_path):
+    """Down over the side of a ball: the force turns round where the motion across the axis does, somewhere near the equator."""
+    angle = np.arange(0.8, -0.8, -25.0 * ROW_S / RADIUS)
+    tip = RADIUS * np.column_stack([np.cos(angle), 0.0 * angle, np.sin(angle)])
+    (x, _, z), (u, _, w) = tip[0], tip[-1]
+    (tmp_path / "p.nc").write_text(f"G21 G90 G18\nG0 X{x} Y0 Z{z}\nG3 X{u} Z{w} I{-x} K{-z} F1500\nM2\n")
+    config = load_config(["config/cartesian.yaml"])
+    path = open_program(str(tmp_path / "p.nc"), config).path
+    found = align(path, tip, np.full(len(tip), 3.0))
+    assert found.distance.max() < 1e-3
+    forces = cutting_forces(
+        lay_track(path, Job(config).conditions), found, tip, ROW_S * np.arange(len(tip)), np.zeros(len(path), bool),
+        logged_line=True,
+    )  # fmt: skip
+    across = np.abs(forces.doubt[:, 0]) > np.abs(forces.force[:, 0])
+    assert across[np.abs(angle) < 0.15].all() and not across[np.abs(angle) > 0.25].any()
