@@ -98,9 +98,9 @@ def diagnose(
         problem = open_problem(bench, causes, stated_mm)
     with part_of_work(0.5, 0.95):
         found = search_causes(problem)
-    best = found.fits[found.verdict.best]
+    best = found.sets.best
     gap = gap_of(problem, best)
-    word: Any = "unknown" if found.unknown_in else found.verdict.word
+    word = found.word
     law = answer_law(problem, best, found.unknown_in) if found.unknown_in else None
     stands = problem
     if law is not None:  # causes have the values that they have beside it; those that had only followed it are gone
@@ -145,14 +145,15 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
         return None
     if found.unknown_in:
         return explore(problem, found.left[found.unknown_in].labels, job)
-    best = found.verdict.best
-    close = [best, *sorted(found.verdict.rivals, key=lambda j: -found.probability[j])[:RIVALS]]
+    sets = found.sets
+    best = sets.ranking.best
+    close = [best, *sets.rivals[:RIVALS]]
     if len(close) == 1:
-        likely = (int(j) for j in np.argsort(-found.probability) if found.probability[j] > EXCLUDED)
+        likely = (int(j) for j in np.argsort(-sets.probability) if sets.probability[j] > EXCLUDED)
         close += [j for j in likely if j != best][:3]
     # rivals explain equally well: a low prior does not exclude them
-    p = np.ones(len(close)) if found.verdict.rivals else found.probability[close]
-    fits = [found.fits[j] for j in close]
+    p = np.ones(len(close)) if sets.rivals else sets.probability[close]
+    fits = [sets.fits[j] for j in close]
     proposal = propose(problem, fits, p / p.sum(), job)
     return None if proposal is None else with_outcomes(proposal, [_set_name(problem, f) for f in fits])
 
@@ -193,7 +194,7 @@ def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer |
             FoundCause(
                 effect=candidate.name,
                 target=candidate.target,
-                probability=found.verdict.inclusion.get(i, 0.0),
+                probability=found.stated.get(i, 0.0),
                 share=round(energy[j] / whole, 4) if whole > 0 else 0.0,
                 parameters=_parameters(problem, best, covariance, j, causes[j]),
             )
@@ -272,9 +273,9 @@ def _heat_logged(problem: Problem) -> bool:
 
 
 def _alternatives(problem: Problem, found: CauseSearch) -> tuple[tuple[NamedCause, ...], ...]:
-    rivals = sorted(found.verdict.rivals, key=lambda j: -found.probability[j])
-    sets = [found.fits[j] for j in (found.verdict.best, *rivals[: MOST_SETS - 1])]
-    named = tuple(tuple(_named(problem, i) for i in f.members) for f in sets)
+    rivals = found.sets.rivals
+    fits = [found.sets.fits[j] for j in (found.sets.ranking.best, *rivals[: MOST_SETS - 1])]
+    named = tuple(tuple(_named(problem, i) for i in f.members) for f in fits)
     return named if rivals else (*named, (NamedCause(effect=UNKNOWN, target=None),))
 
 
@@ -356,8 +357,8 @@ def _shrinkage(
         chosen = [dict(zip(best.members, causes, strict=True))] * len(seen.runs)
     else:
         seen = problem.bench
-        rivals = () if found is None else found.fits
-        chosen = causes_without(problem, best, rivals, np.zeros(0) if found is None else found.probability)
+        rivals = () if found is None else found.sets.fits
+        chosen = causes_without(problem, best, rivals, np.zeros(0) if found is None else found.sets.probability)
     floor = round(floor_um(problem), 3)
     return shrinkage_of(
         problem, best, seen=seen, chosen=chosen, order=_by_energy(problem, best), part=main_channels(problem),

@@ -33,7 +33,7 @@ Columns = dict[str, NDArray[Any]]
 def of_runs(done: Diagnosis, twin: Twin, runs: Sequence[Run]) -> Columns:
     """Runs of programs in their order, those held out too: the causes are those fitted to the others."""
     problem, names = done.problem, columns_of(twin)
-    best = done.search.fits[done.search.verdict.best]
+    best = done.search.sets.best
     causes = problem.causes(best.members, best.theta, best.extra) if done.result.known else []
     channels = (*TIP, *names.encoder, *names.drive, *DYNO)
     seen = {run.name: (problem.bench, k) for k, run in enumerate(problem.bench.runs)}

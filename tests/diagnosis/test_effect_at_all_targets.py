@@ -35,4 +35,4 @@ def problem(tmp_path):
 
 
 def test_springs_of_all_drives_are_fitted_together(problem):
-    assert SPRINGS in {f.members for f in cause_search.search_causes(problem).fits}
+    assert SPRINGS in {f.members for f in cause_search.search_causes(problem).sets.fits}

@@ -93,7 +93,7 @@ def rivals_of(done: Diagnosis) -> list[RivalSignals]:
         return []
     part = main_channels(problem)
     out = []
-    for fit in (found.fits[found.verdict.best], *(found.fits[j] for j in found.verdict.rivals)):
+    for fit in (found.sets.best, *(found.sets.fits[j] for j in found.sets.ranking.rivals)):
         causes = problem.causes(fit.members, fit.theta, fit.extra)
         names = [cause_name(NamedCause(effect=each.name, target=each.target)) for each in causes]
         signals = tuple(

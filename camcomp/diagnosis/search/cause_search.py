@@ -9,7 +9,8 @@ from camcomp.diagnosis.fit.floor import GATE
 from camcomp.diagnosis.fit.gap import is_at_floor
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
-from camcomp.diagnosis.model.verdict import SURE
+from camcomp.diagnosis.model.discrepancy import with_discrepancy
+from camcomp.diagnosis.model.verdict import VerdictInputs, Word, decide
 from camcomp.diagnosis.search.credible import MODELLED, credibility
 from camcomp.diagnosis.search.fitted_sets import ROUNDS, FittedSets
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
@@ -23,8 +24,8 @@ from camcomp.diagnosis.statistics.cause_sets import (
 )
 from camcomp.diagnosis.statistics.evidence import misfit
 from camcomp.diagnosis.statistics.probability import EVEN, TEMPERATURE
+from camcomp.diagnosis.statistics.ranking import Ranking, rank
 from camcomp.diagnosis.statistics.score_test import ResidualTest
-from camcomp.diagnosis.statistics.verdict import Verdict, judge
 from camcomp.ground.datatypes import Floats
 
 SAME_EVIDENCE = 2.0  # log evidence by which two sets may differ and still be the same answer, whatever their priors
@@ -33,13 +34,33 @@ LEFT_OPEN = 0.25  # of what causes explain together: no set explains what leaves
 INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class CauseSearch:
-    """Fitted sets of causes, their probabilities, the verdict, and the residual of the best set."""
+@dataclass(frozen=True, eq=False)
+class RankedSets:
+    """Sets that are answers with their probabilities at a temperature, and the ranking among them."""
 
     fits: tuple[Fitted, ...]
     probability: Floats
-    verdict: Verdict
+    ranking: Ranking
+    temperature: float
+
+    @property
+    def best(self) -> Fitted:
+        """The leading set."""
+        return self.fits[self.ranking.best]
+
+    @property
+    def rivals(self) -> list[int]:
+        """Indices of the sets that explain the data as well, the most probable first."""
+        return sorted(self.ranking.rivals, key=lambda j: -self.probability[j])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CauseSearch:
+    """Fitted sets of causes with their ranking, the verdict, and the residual of the best set."""
+
+    sets: RankedSets
+    word: Word
+    stated: Mapping[int, float]  # calibrated probability of every candidate of a fitted set
     left: Mapping[str, ResidualTest]  # per kind of channel
     unknown_in: str | None  # the kind in which an effect shows that the library does not have
     beyond: Mapping[str, Unexplained]  # what unseen runs show beyond the floor, per kind of channel
@@ -47,33 +68,19 @@ class CauseSearch:
 
 def search_causes(problem: Problem) -> CauseSearch:
     """Fit sets, rank them, test the best one for an unmodelled effect, and state probabilities."""
-    sets = FittedSets(problem)
-    weighed = _weigh_answers(problem, sets)
-    best = weighed.fits[weighed.verdict.best]
-    beside = _look_beside(problem, best, sets)
-    weighed = _with_answer(problem, weighed, beside.known)
-    prior = problem.prior if beside.kind is None else firm_prior(problem)
-    left = residual_tests(problem, beside.known, prior)
-    kind = beside.kind if beside.kind is None or beside.kind in left else next(iter(left))
-    verdict = _state(weighed, beside)
+    fitted = FittedSets(problem)
+    ranked = _rank_answers(problem, fitted)
+    kept = _keep_causes(problem, ranked.best, fitted)
+    ranked = _with_answer(problem, ranked, kept.known)
+    stated = _stated(ranked, kept)
+    left, kind = _describe_residual(problem, kept)
     return CauseSearch(
-        fits=weighed.fits, probability=weighed.probability, verdict=verdict, left=left, unknown_in=kind,
-        beyond=beside.beyond,
-    )  # fmt: skip
+        sets=ranked, word=_verdict(ranked, stated, kind), stated=stated, left=left, unknown_in=kind, beyond=kept.beyond
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class _Weighed:
-    """Sets that are answers with their probabilities at a temperature, and the verdict among them."""
-
-    fits: tuple[Fitted, ...]
-    probability: Floats
-    verdict: Verdict
-    temperature: float
-
-
-def _weigh_answers(problem: Problem, sets: FittedSets) -> _Weighed:
-    """Sets without small members, with their probabilities and verdict."""
+def _rank_answers(problem: Problem, sets: FittedSets) -> RankedSets:
+    """Sets without small members, with their probabilities and ranking."""
     best = sets.null
     for _ in range(ROUNDS):
         sets.search_near(best)
@@ -84,11 +91,11 @@ def _weigh_answers(problem: Problem, sets: FittedSets) -> _Weighed:
         best = fits[int(np.argmax(probability))]
         if best.members in sets.searched:
             break
-    return _Weighed(fits, probability, judge(fits, probability, _same(problem, fits, best)), temperature)
+    return RankedSets(fits, probability, rank(fits, probability, _same(problem, fits, best)), temperature)
 
 
 @dataclass(frozen=True, eq=False)
-class _Beside:
+class _Kept:
     """The answer that is kept jointly with an unmodelled effect, the probabilities of its members, and the excess
     residual on held-out runs.
 
@@ -101,42 +108,54 @@ class _Beside:
     kind: str | None
 
 
-def _look_beside(problem: Problem, best: Fitted, sets: FittedSets) -> _Beside:
+def _keep_causes(problem: Problem, best: Fitted, sets: FittedSets) -> _Kept:
     """Test for an unmodelled effect jointly with the best answer, and select the members that are kept."""
     beyond = unexplained(problem, sets.fit(best.all_members))  # minor effects explain their part, too
     kind = unknown_kind(problem, best, beyond)
     known, credible, instead = _credible(problem, best, beyond, sets.fit)
     if kind is None and known.members and is_at_floor(problem, known):
-        return _Beside(sets.null, {}, beyond, None)
+        return _Kept(sets.null, {}, beyond, None)
     if known.members != best.members:
         beyond = unexplained(problem, known)
         kind = unknown_kind(problem, known, beyond) or (worst(beyond).kind if kind or instead else None)
-    return _Beside(known, credible, beyond, kind)
+    return _Kept(known, credible, beyond, kind)
 
 
-def _with_answer(problem: Problem, weighed: _Weighed, known: Fitted) -> _Weighed:
+def _with_answer(problem: Problem, sets: RankedSets, known: Fitted) -> RankedSets:
     """The sets with the answer that stays at their head."""
-    if known.members == weighed.fits[weighed.verdict.best].members:
-        return weighed
-    fits = (known, *(f for f in weighed.fits if f.members != known.members))
-    word = "identified" if known.members else "none"
-    return replace(
-        weighed,
-        fits=fits,
-        probability=probabilities(fits, problem.candidates, weighed.temperature),
-        verdict=replace(weighed.verdict, word=word, best=0, rivals=()),
-    )
+    if known.members == sets.best.members:
+        return sets
+    fits = (known, *(f for f in sets.fits if f.members != known.members))
+    probability = probabilities(fits, problem.candidates, sets.temperature)
+    return replace(sets, fits=fits, probability=probability, ranking=replace(sets.ranking, best=0, rivals=()))
 
 
-def _state(weighed: _Weighed, beside: _Beside) -> Verdict:
-    """The verdict with calibrated probabilities: of a cause that all sets have and that nothing unmodelled imitates."""
-    verdict, members = weighed.verdict, weighed.fits[weighed.verdict.best].members
+def _stated(sets: RankedSets, kept: _Kept) -> dict[int, float]:
+    """Calibrated probability of every candidate: that all sets have it and that nothing unmodelled imitates it.
+
+    Beside something unmodelled of any form causes share what its prior leaves.
+    """
     # the posterior of the sets lacks causes that are seen only jointly with something unmodelled
-    posterior = dict.fromkeys(beside.known.members, 1.0) | verdict.inclusion
+    posterior = dict.fromkeys(kept.known.members, 1.0) | sets.ranking.inclusion
+    posterior = {i: min(p, kept.credible.get(i, 1.0)) for i, p in posterior.items()}
     calibrate = calibration_of("programs").calibrate
-    inclusion = {i: calibrate(min(p, beside.credible.get(i, 1.0))) for i, p in posterior.items()}
-    open_causes = verdict.word == "identified" and min(inclusion[i] for i in members) < SURE
-    return replace(verdict, inclusion=inclusion, word="ambiguous" if open_causes else verdict.word)
+    return {i: calibrate(p if kept.kind is None else with_discrepancy(p)) for i, p in posterior.items()}
+
+
+def _verdict(sets: RankedSets, stated: Mapping[int, float], kind: str | None) -> Word:
+    """The verdict on the best set; kind: of channel in which something unmodelled shows."""
+    return decide(
+        VerdictInputs(
+            unknown=float(kind is not None), best=min((stated[i] for i in sets.best.members), default=1.0),
+            alternatives=len(sets.ranking.rivals), causes=len(sets.best.members), known_noise=True, confirmed=True,
+        )
+    )  # fmt: skip
+
+
+def _describe_residual(problem: Problem, kept: _Kept) -> tuple[dict[str, ResidualTest], str | None]:
+    """Covariates of the residual per kind of channel, and the kind in which something unmodelled shows."""
+    left = residual_tests(problem, kept.known, problem.prior if kept.kind is None else firm_prior(problem))
+    return left, kept.kind if kept.kind is None or kept.kind in left else next(iter(left))
 
 
 def _credible(

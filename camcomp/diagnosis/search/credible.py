@@ -1,6 +1,7 @@
 """How sure is a cause where something unmodelled may act, instead of it or jointly with it?
 
-Hypotheses h: nothing unmodelled, or functions of one covariate at one scale. With S the parts of a set of causes,
+Hypotheses h: nothing unmodelled, functions of one covariate at one scale, or a smooth process over the time of every run.
+With S the parts of a set of causes,
 
     P(cause i) = sum_(S has i, h) p(S, h) / sum_(S, h) p(S, h),      log p(S, h) = log evidence(S, h) / T + log prior(S, h)
 
@@ -11,22 +12,21 @@ Sources: Hoeting et al., Statistical Science 14 (1999) 382; Kennedy, O'Hagan, J.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
 
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.discrepancy import gains_at_scales
+from camcomp.diagnosis.model.discrepancy import UNKNOWN, gains_at_scales
 from camcomp.diagnosis.model.noise import MINOR
-from camcomp.diagnosis.search.unknown import joint_products
+from camcomp.diagnosis.search.unknown import joint_products, smooth_in_time
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, parts_of
-from camcomp.diagnosis.statistics.evidence import base, holding_back, log_bayes
+from camcomp.diagnosis.statistics.evidence import Gram, base, holding_back, log_bayes
 from camcomp.diagnosis.statistics.score_test import JointProducts
 from camcomp.ground.datatypes import Floats, Ints
 
-UNMODELLED = 0.1  # prior probability of something that the library does not have
 MODELLED = 0.1  # of what causes explain: none is modelled better than that
 
 
@@ -40,43 +40,78 @@ class Credibility:
 
 def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float) -> Credibility:
     """How sure the members of f are; surely: whether something unmodelled acts for certain."""
-    members, columns = f.members, problem.candidates.columns
+    members = f.members
     if not members:
         return Credibility({}, {})
-    joint = joint_products(problem, f, _weights(problem))
-    at, groups = base(joint.data, problem.prior), covariates(joint)
-    theta, first = dict[int, Floats](), 0
-    for i in members:
-        theta[i] = f.theta[first : (first := first + len(columns[i]))]
-    value, there, unmodelled = list[float](), list[list[float]](), list[bool]()
-    for some in parts_of(members):
-        index = problem.member_columns(some)
-        alone = at.log_evidence - holding_back(at, problem.prior, index)
-        alone += float(log_bayes(at, problem.prior, [[columns[i] for i in some]])[0])
-        odds, has = problem.candidates.prior(some), [float(i in some) for i in members]
-        if not surely:
-            value.append(alone / temperature + odds + float(np.log(1.0 - UNMODELLED)))
-            there.append(has)
-            unmodelled.append(False)
-        P, h = joint.projected(problem.prior, index)
+    weight = _weights(problem)
+    joint = joint_products(problem, f, weight)
+    alone, groups = _alone(problem, f, joint.data), covariates(joint)
+    found = _with_covariates(problem, f, joint, alone, groups)
+    scales = smooth_in_time(problem, f, weight)
+    for data, log_size in scales:
+        found += [
+            replace(each, evidence=each.evidence - log_size, unmodelled=1.0 / len(scales))
+            for each in _alone(problem, f, data)
+        ]
+    if not surely:
+        found += alone
+    of_each = UNKNOWN / (len(groups) + 1)
+    prior = np.array([each.unmodelled * of_each if each.unmodelled else 1.0 - UNKNOWN for each in found])
+    value = np.array([each.evidence / temperature + each.prior for each in found]) + np.log(prior)
+    p = np.exp(value - logsumexp(value))
+    there = np.array([each.there for each in found])
+    without = (p * (prior != 1.0 - UNKNOWN)) @ (1.0 - there)
+    return Credibility(
+        dict(zip(members, (p @ there).tolist(), strict=True)), dict(zip(members, without.tolist(), strict=True))
+    )
+
+
+@dataclass(frozen=True)
+class _Hypothesis:
+    """A part of a set: log evidence, log prior of the part, and which members of the whole set act.
+
+    unmodelled: share of a covariate's prior probability, 0 where nothing unmodelled acts.
+    """
+
+    evidence: float
+    prior: float
+    there: tuple[float, ...]
+    unmodelled: float = 0.0
+
+
+def _alone(problem: Problem, f: Fitted, data: Gram) -> list[_Hypothesis]:
+    """Every part of a set by normal equations, with nothing unmodelled in them."""
+    at, columns = base(data, problem.prior), problem.candidates.columns
+    out = []
+    for some in parts_of(f.members):
+        value = at.log_evidence - holding_back(at, problem.prior, problem.member_columns(some))
+        value += float(log_bayes(at, problem.prior, [[columns[i] for i in some]])[0])
+        there = tuple(float(i in some) for i in f.members)
+        out.append(_Hypothesis(value, problem.candidates.prior(some), there))
+    return out
+
+
+def _with_covariates(
+    problem: Problem, f: Fitted, joint: JointProducts, alone: Sequence[_Hypothesis], groups: Sequence[Ints]
+) -> list[_Hypothesis]:
+    """Every part of a set jointly with functions of every covariate."""
+    columns, theta, first = problem.candidates.columns, list[Floats](), 0
+    for i in f.members:
+        theta.append(f.theta[first : (first := first + len(columns[i]))])
+    out = []
+    for some, own in zip(parts_of(f.members), alone, strict=True):
+        P, h = joint.projected(problem.prior, problem.member_columns(some))
         for g in groups:
             # a scale is the rms of all rows, in units of the noise
             unit = float(np.sqrt(joint.rows / np.diag(joint.P)[g].sum()))
             gains, amount = gains_at_scales(P[np.ix_(g, g)], h[g], unit)
-            gain = float(logsumexp(gains)) - float(np.log(len(gains)))
-            value.append((alone + gain) / temperature + odds + float(np.log(UNMODELLED / len(groups))))
-            there.append(
-                [
-                    1.0 if own else float(_is_alike(joint, g, amount, columns[i], theta[i]))
-                    for own, i in zip(has, members, strict=True)
-                ]
+            there = tuple(
+                has or float(_is_alike(joint, g, amount, columns[i], each))
+                for has, i, each in zip(own.there, f.members, theta, strict=True)
             )
-            unmodelled.append(True)
-    v, m = np.array(value), np.array(there)
-    p = np.exp(v - logsumexp(v))
-    without = p * np.array(unmodelled)
-    present = {i: float(p @ m[:, n]) for n, i in enumerate(members)}
-    return Credibility(present, {i: float(without @ (1.0 - m[:, n])) for n, i in enumerate(members)})
+            gain = float(logsumexp(gains)) - float(np.log(len(gains)))
+            out.append(_Hypothesis(own.evidence + gain, own.prior, there, 1.0))
+    return out
 
 
 def covariates(joint: JointProducts) -> list[Ints]:

@@ -6,11 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import eigh
 
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SIZES_OF_PROCESS
+from camcomp.diagnosis.model.group import SmoothProcess
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
-from camcomp.diagnosis.statistics.evidence import Prior, estimate
+from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate
 from camcomp.diagnosis.statistics.score_test import JointProducts, Patterns, ResidualTest, score_test
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
@@ -37,6 +40,48 @@ def joint_products(problem: Problem, f: Fitted, weight: Sequence[Sequence[float]
             white=white, residual=residual, blocks=problem.white_patterns, labels=labels, kinds=kinds, weight=weight
         )
     )
+
+
+def smooth_in_time(problem: Problem, f: Fitted, weight: Sequence[Sequence[float]]) -> list[tuple[Gram, float]]:
+    """Normal equations about a fit with a smooth process over the time of every run in the first kind of channel, and the log
+    of its size, at every scale of model/discrepancy; weight: of a row, per run and kind.
+    """
+    k, scales, rows = len(problem.columns.names), len(LENGTHS["time"]) * len(SIZES_OF_PROCESS), 0.0
+    A, log_size = np.zeros((scales, k + 1, k + 1)), np.zeros(scales)
+    for run, (W, r) in enumerate(zip(*about(problem, f), strict=True)):
+        joint, at = W.appended(r[:, None]), problem.row_places(run)
+        ends = np.cumsum([len(part) for part in problem.white_patterns[run]]).tolist()
+        for first, last, size in zip([0, *ends], ends, weight[run], strict=False):
+            own = joint[first:last]
+            rows += size**2 * len(own)
+            if first:
+                A += size**2 * (own.T @ own)
+            else:
+                _add_smooth(A, log_size, [(on, size * X) for on, X in own.parts if len(X)], at)
+    return [
+        (Gram(each[:k, :k], each[:k, k], float(each[k, k]), round(rows)), float(log))
+        for each, log in zip(A, log_size, strict=True)
+    ]
+
+
+def _add_smooth(A: Floats, log_size: Floats, channels: Sequence[tuple[Ints, Floats]], places: Floats) -> None:
+    """Add products (scales, k, k) of white rows, channel behind channel at places (w,), with the process at every scale."""
+    known: dict[bytes, list[tuple[Floats, Floats]]] = {}  # channels are mostly read at the same places
+    first = 0
+    for on, X in channels:
+        place = places[first : (first := first + len(X))]
+        for region in np.array_split(np.arange(len(X)), -(-len(X) // ROWS_OF_PROCESS)):
+            key = place[region].tobytes()
+            known[key] = known.get(key) or [
+                eigh(SmoothProcess(1.0, length, "time").correlation(place[region][:, None]))
+                for length in LENGTHS["time"]
+            ]
+            for i, (spread, way) in enumerate(known[key]):
+                turned = way.T @ X[region]
+                for j, size in enumerate(SIZES_OF_PROCESS, i * len(SIZES_OF_PROCESS)):
+                    grown = 1.0 + size**2 * np.maximum(spread, 0.0)
+                    A[j][np.ix_(on, on)] += turned.T @ (turned / grown[:, None])
+                    log_size[j] += 0.5 * float(np.log(grown).sum())
 
 
 def about(problem: Problem, f: Fitted) -> tuple[list[ByChannel], list[Floats]]:

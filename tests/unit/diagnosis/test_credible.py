@@ -9,10 +9,10 @@ from camcomp.diagnosis.search import credible
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted
 from camcomp.diagnosis.statistics.evidence import Prior
-from camcomp.diagnosis.statistics.score_test import JointProducts, Patterns
 
 ROWS = 400
 U = np.linspace(0.0, 1.0, ROWS)
+TIME = np.random.default_rng(0).permutation(U)  # places are visited in no order
 COVARIATE = np.stack([np.sin(2 * np.pi * U), np.cos(2 * np.pi * U), np.sin(4 * np.pi * U)], axis=1)
 
 
@@ -21,19 +21,13 @@ def present(monkeypatch, column, left, *, surely=False):
     one = np.ones(1)
     problem = SimpleNamespace(
         prior=Prior(0.01 * one, one, 0.0 * one, np.inf * one), member_columns=list,
-        candidates=CausePrior(((0,),), np.log(0.5 * one), lambda i, j: True),
+        candidates=CausePrior(((0,),), np.log(0.5 * one), lambda i, j: True), columns=SimpleNamespace(names=["cause"]),
+        dictionaries=[SimpleNamespace(kind="tip", labels=["place:x"] * 3)], white_patterns=[[ByChannel.of([COVARIATE])]],
+        white_at=lambda _: [ByChannel.of([column[:, None]])], row_places=lambda _: TIME,
     )  # fmt: skip
-    patterns = Patterns(
-        white=[ByChannel.of([column[:, None]])],
-        residual=[left],
-        blocks=[[ByChannel.of([COVARIATE])]],
-        labels=[["place:x"] * 3],
-        kinds=["tip"],
-    )
-    monkeypatch.setattr(credible, "joint_products", lambda *_: JointProducts.of(patterns))
-    monkeypatch.setattr(credible, "_weights", lambda _: None)
+    monkeypatch.setattr(credible, "_weights", lambda _: [[1.0]])
     amount = float(column @ left / (column @ column))
-    f = Fitted(members=(0,), theta=np.array([amount]), covariance=np.eye(1), log_evidence=0.0, grams=())
+    f = Fitted(members=(0,), theta=np.array([amount]), covariance=np.eye(1), log_evidence=0.0, grams=(), residual=(left,))
     found = credible.credibility(problem, f, surely=surely, temperature=1.5)
     return found.present[0], found.replaced[0]
 
@@ -60,4 +54,19 @@ def test_a_column_that_follows_the_half_of_an_unmodelled_effect_is_replaced_by_i
 def test_functions_that_draw_just_the_cause_are_the_cause_under_another_name(monkeypatch, surely):
     column = COVARIATE[:, 0] + 0.5 * COVARIATE[:, 2]
     sure, _ = present(monkeypatch, column, 8.0 * column + noise(3), surely=surely)
+    assert sure > 0.95
+
+
+def shift(begin, end):
+    return np.where((begin < TIME) & (end > TIME), 1.0, 0.0)
+
+
+def test_a_shift_for_a_while_where_a_run_wanders_all_the_time_is_the_wandering(monkeypatch):
+    wandering = 2.0 * np.sin(19.0 * TIME) + 1.5 * np.cos(31.0 * TIME)
+    sure, replaced = present(monkeypatch, shift(0.37, 0.46), wandering + noise(4))
+    assert sure < 0.5 and replaced > 0.5
+
+
+def test_a_shift_for_a_while_that_begins_and_ends_at_once_stays(monkeypatch):
+    sure, _ = present(monkeypatch, shift(0.3, 0.5), 2.0 * shift(0.3, 0.5) + noise(5))
     assert sure > 0.95

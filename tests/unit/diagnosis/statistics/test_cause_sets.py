@@ -16,7 +16,7 @@ from camcomp.diagnosis.statistics.cause_sets import (
     Scale,
 )
 from camcomp.diagnosis.statistics.evidence import Prior, gram
-from camcomp.diagnosis.statistics.verdict import judge
+from camcomp.diagnosis.statistics.ranking import rank
 
 
 def candidates(n):
@@ -89,33 +89,32 @@ def test_what_has_one_origin_is_of_one_size():
 
 def test_a_rival_is_another_set_that_is_neither_larger_nor_the_same_with_one_more_or_less():
     fits = [fitted(0), fitted(1), fitted(0, 1), fitted(1, 2), fitted()]
-    verdict = judge(fits, np.full(5, 0.2) + [0.01, 0.0, 0.0, 0.0, 0.0], [])
-    assert (verdict.word, verdict.rivals) == ("ambiguous", (1,))
+    assert rank(fits, np.full(5, 0.2) + [0.01, 0.0, 0.0, 0.0, 0.0], []).rivals == (1,)
     without = [each for each in fits if each.members != (1,)]
-    assert judge(without, np.array([0.28, 0.24, 0.24, 0.24]), []).word == "identified"
-    pair = judge([fitted(0, 1), fitted(1), fitted(2)], np.array([0.4, 0.3, 0.3]), [])
+    assert rank(without, np.array([0.28, 0.24, 0.24, 0.24]), []).rivals == ()
+    pair = rank([fitted(0, 1), fitted(1), fitted(2)], np.array([0.4, 0.3, 0.3]), [])
     assert pair.rivals == (2,)
 
 
 def test_twins_have_equal_parts_of_their_probability_whatever_their_priors():
     fits = [fitted(0), fitted(1), fitted(2)]
-    verdict = judge(fits, np.array([0.97, 0.02, 0.01]), [((0,), (1,))])
-    assert (verdict.word, verdict.best, verdict.rivals) == ("ambiguous", 0, (1,))
-    assert (verdict.inclusion[0], verdict.inclusion[1]) == pytest.approx((0.495, 0.495))
+    ranking = rank(fits, np.array([0.97, 0.02, 0.01]), [((0,), (1,))])
+    assert (ranking.best, ranking.rivals) == (0, (1,))
+    assert (ranking.inclusion[0], ranking.inclusion[1]) == pytest.approx((0.495, 0.495))
 
 
 def test_sets_of_another_kind_break_no_tie():
     """Membership in many improbable sets does not make one of two indistinguishable candidates more probable."""
     fits = [fitted(0, 1), fitted(0, 2), fitted(1, 3)]
-    inclusion = judge(fits, np.array([0.60, 0.35, 0.05]), [((0, 1), (0, 2))]).inclusion
+    inclusion = rank(fits, np.array([0.60, 0.35, 0.05]), [((0, 1), (0, 2))]).inclusion
     assert inclusion[1] == pytest.approx(0.5)
     assert inclusion[0] == pytest.approx(0.95)
 
 
 def test_a_set_far_less_probable_is_a_rival_only_where_nothing_tells_it_apart():
     fits = [fitted(0), fitted(1)]
-    assert judge(fits, np.array([0.99, 0.01]), []).word == "identified"
-    assert judge(fits, np.array([0.99, 0.01]), [((1,), (0,))]).rivals == (1,)
+    assert rank(fits, np.array([0.99, 0.01]), []).rivals == ()
+    assert rank(fits, np.array([0.99, 0.01]), [((1,), (0,))]).rivals == (1,)
 
 
 def test_a_minor_one_makes_no_set_likelier_before_the_data():

@@ -1,4 +1,4 @@
-"""From ranked sets of causes to a verdict: none, identified or ambiguous."""
+"""From sets of causes with probabilities to the best set, its alternatives and the probability of every cause."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,19 +11,18 @@ from camcomp.ground.datatypes import Floats
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
-    """word: none | identified | ambiguous. best: index of the leading set. rivals: indices of sets that explain the data as
-    well. inclusion: probability of every candidate that any fitted set has.
+class Ranking:
+    """best: index of the leading set. rivals: indices of sets that explain the data as well. inclusion: probability of every
+    candidate that any fitted set has.
     """
 
-    word: str
     best: int
     rivals: tuple[int, ...]
     inclusion: dict[int, float]
 
 
-def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Members, Members]]) -> Verdict:
-    """The verdict on fits with their probabilities; twins: pairs of sets that the data cannot tell apart.
+def rank(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Members, Members]]) -> Ranking:
+    """The ranking of fits by their probabilities; twins: pairs of sets that the data cannot tell apart.
 
     Twins of the best set and itself have equal parts of their common probability: neither a prior nor other sets break that tie.
     """
@@ -48,5 +47,4 @@ def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Mem
             inclusion[i] = inclusion.get(i, 0.0) + float(p)
     for i in leader.members:
         inclusion[i] = min(inclusion[i], sum(i in fits[j].members for j in twin) / len(twin))
-    word = "none" if not leader.members else "ambiguous" if rivals else "identified"
-    return Verdict(word, best, tuple(rivals), inclusion)
+    return Ranking(best, tuple(rivals), inclusion)
