@@ -60,6 +60,15 @@ def experiment(folder, rad_per_Nm=0.0, growth_mm_per_K=0.0):
 
 
 @pytest.mark.parametrize(
+    ("fault", "effect"), [({"rad_per_Nm": 1e-7}, "base_compliance"), ({"growth_mm_per_K": 0.006}, "link_growth")]
+)
+def test_a_library_without_it_names_no_other_cause_for_certain(tmp_path, fault, effect):
+    result = runner.ask(experiment(tmp_path, **fault), (effect,))
+    assert result["verdict"] in ("ambiguous", "unknown")
+    assert all(each["probability"] <= 0.8 for each in result["causes"] if each["effect"] != "unknown")
+
+
+@pytest.mark.parametrize(
     ("fault", "effect", "target", "want"),
     [
         ({"rad_per_Nm": 1e-7}, "base_compliance", None, {"rad_per_Nmm": 1e-10, "rad_per_N": 4e-8}),

@@ -8,10 +8,10 @@ import pytest
 
 from camcomp.api.diagnosis import diagnose
 from camcomp.diagnosis.next_experiment.designed import propose
-from camcomp.diagnosis.search.cause_search import SAME_EVIDENCE
 from camcomp.diagnosis.search.indistinguishable import classes, likeness
 from camcomp.diagnosis.statistics.cause_sets import total
 from camcomp.diagnosis.statistics.evidence import gram, misfit
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from tests.diagnosis.conftest import plan_of
 from tests.validation.orthoglide.cases import EQUAL
 from tests.validation.plants.further_run import add_run
@@ -97,8 +97,8 @@ def test_rows_of_a_member_in_its_own_direction_are_what_another_one_has_to_fit(w
         data = total([gram(W, W[:, frame] @ theta) for W in problem.white])
         return 0.5 * (misfit(data, problem.prior, tool) - misfit(data, problem.prior, frame))
 
-    assert behind(np.array([0.0, 0.0, 1.0, 0.0])) < SAME_EVIDENCE
-    assert behind(np.array([1.0, 0.5, 0.0, 0.3])) > SAME_EVIDENCE
+    assert behind(np.array([0.0, 0.0, 1.0, 0.0])) < EQUAL_LOG_ODDS
+    assert behind(np.array([1.0, 0.5, 0.0, 0.3])) > EQUAL_LOG_ODDS
 
 
 @pytest.mark.campaign

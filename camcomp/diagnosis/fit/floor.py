@@ -18,7 +18,6 @@ from camcomp.model.seams import missing_rows
 
 CLIPPED = 6.0  # robust deviations beyond which a difference of rows is no noise
 LEAST_ROWS = 10  # of a run with a program, for an estimate of its noise
-GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effect that the library lacks
 LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
 STRETCH, LEAST_STRETCHES = 16, 8  # differences of rows that make a stretch, and stretches that tell a quiet one
 LOWER_QUARTILE = 0.82  # of the scatter of such stretches of white noise, in units of the noise (4000 draws: 0.816)

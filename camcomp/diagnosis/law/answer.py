@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.fit.floor import GATE
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import TermBench, spots
@@ -16,6 +15,7 @@ from camcomp.diagnosis.law.find import FoundLaw, find_law
 from camcomp.diagnosis.law.folds import Folds, Split, usual_split
 from camcomp.diagnosis.law.screen import term_grids
 from camcomp.diagnosis.law.smooth import find_map
+from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.result.types import Law
 from camcomp.diagnosis.search.unknown import about, firm_prior
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
@@ -85,7 +85,7 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
     for k, (own, find, asked) in enumerate(
         ((f, formula, True), (None, formula, room > floor), (f, smooth, kind == "tip"))
     ):
-        much = np.sqrt(max(after**2 - floor**2, 0.0)) > GATE * max(floor, room)
+        much = after**2 - floor**2 > (ABOVE - 1.0) * max(floor, room) ** 2
         if k and not (asked and much):
             continue
         found = find(own)

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.fit.floor import GATE
 from camcomp.diagnosis.fit.gap import is_at_floor
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
+from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.model.verdict import VerdictInputs, Word, decide
 from camcomp.diagnosis.search.credible import MODELLED, credibility
 from camcomp.diagnosis.search.fitted_sets import ROUNDS, FittedSets
@@ -23,12 +23,11 @@ from camcomp.diagnosis.statistics.cause_sets import (
     total,
 )
 from camcomp.diagnosis.statistics.evidence import misfit
-from camcomp.diagnosis.statistics.probability import EVEN, TEMPERATURE
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN, TEMPERATURE
 from camcomp.diagnosis.statistics.ranking import Ranking, rank
 from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.ground.datatypes import Floats
 
-SAME_EVIDENCE = 2.0  # log evidence by which two sets may differ and still be the same answer, whatever their priors
 GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
 LEFT_OPEN = 0.25  # of what causes explain together: no set explains what leaves more, however large its members are
 INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
@@ -99,13 +98,15 @@ class _Kept:
     """The answer that is kept jointly with an unmodelled effect, the probabilities of its members, and the excess
     residual on held-out runs.
 
-    kind: of channel in which something unmodelled shows, None where none does.
+    kind: of channel in which something unmodelled shows, None where none does. above_floor: whether the excess is above the
+    floor, though no more than what errors of the causes explain.
     """
 
     known: Fitted
     credible: Mapping[int, float]
     beyond: Mapping[str, Unexplained]
     kind: str | None
+    above_floor: bool
 
 
 def _keep_causes(problem: Problem, best: Fitted, sets: FittedSets) -> _Kept:
@@ -114,11 +115,11 @@ def _keep_causes(problem: Problem, best: Fitted, sets: FittedSets) -> _Kept:
     kind = unknown_kind(problem, best, beyond)
     known, credible, instead = _credible(problem, best, beyond, sets.fit)
     if kind is None and known.members and is_at_floor(problem, known):
-        return _Kept(sets.null, {}, beyond, None)
+        return _Kept(sets.null, {}, beyond, None, False)
     if known.members != best.members:
         beyond = unexplained(problem, known)
         kind = unknown_kind(problem, known, beyond) or (worst(beyond).kind if kind or instead else None)
-    return _Kept(known, credible, beyond, kind)
+    return _Kept(known, credible, beyond, kind, bool(above_floor(problem, beyond)))
 
 
 def _with_answer(problem: Problem, sets: RankedSets, known: Fitted) -> RankedSets:
@@ -133,13 +134,14 @@ def _with_answer(problem: Problem, sets: RankedSets, known: Fitted) -> RankedSet
 def _stated(sets: RankedSets, kept: _Kept) -> dict[int, float]:
     """Calibrated probability of every candidate: that all sets have it and that nothing unmodelled imitates it.
 
-    Beside something unmodelled of any form causes share what its prior leaves.
+    Where withheld runs exceed the floor causes share what the prior of a discrepancy of any form leaves.
     """
     # the posterior of the sets lacks causes that are seen only jointly with something unmodelled
     posterior = dict.fromkeys(kept.known.members, 1.0) | sets.ranking.inclusion
     posterior = {i: min(p, kept.credible.get(i, 1.0)) for i, p in posterior.items()}
     calibrate = calibration_of("programs").calibrate
-    return {i: calibrate(p if kept.kind is None else with_discrepancy(p)) for i, p in posterior.items()}
+    open_to_others = kept.kind is not None or kept.above_floor
+    return {i: calibrate(with_discrepancy(p) if open_to_others else p) for i, p in posterior.items()}
 
 
 def _verdict(sets: RankedSets, stated: Mapping[int, float], kind: str | None) -> Word:
@@ -179,25 +181,31 @@ def _credible(
             most = max(replaced, key=lambda i: replaced[i], default=None)
             if most is None or replaced[most] < (EVEN if unknown else INSTEAD):
                 return f, dict(credible.present), instead
-            instead = instead or problem.moved_um(f, (most,)) > _least(problem, f)
+            instead = instead or problem.moved_um(f, (most,)) > _least(problem, _modelled(problem, f))
             kept = tuple(i for i in f.members if i != most)
         f = fit(kept)
         beyond = unexplained(problem, f)
 
 
-def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> str | None:
-    """The kind of channel in which withheld runs exceed the floor most; None where all stay within it."""
-    least = _least(problem, f)
-    for_a_while = max(GATE_LOCAL * problem.floor.tip_um, 2.0 * _modelled(problem, f))
-    # where the tip is measured it says itself what moves it; only of the control it knows nothing
+def above_floor(problem: Problem, beyond: Mapping[str, Unexplained], modelled_um: float = 0.0) -> list[Unexplained]:
+    """The kinds of channel in which withheld runs exceed the floor, and what errors of causes explain (um at the tip).
+
+    Where the tip is measured it says itself what moves it; only of the control it knows nothing.
+    """
     counts = [beyond[kind] for kind in (("tip", "encoder") if "tip" in beyond else beyond) if kind in beyond]
-    found = [each for each in counts if each.z > SURE_Z and (each.excess_um > least or each.local_um > for_a_while)]
+    least, for_a_while = _least(problem, modelled_um), max(GATE_LOCAL * problem.floor.tip_um, 2.0 * modelled_um)
+    return [each for each in counts if each.z > SURE_Z and (each.excess_um > least or each.local_um > for_a_while)]
+
+
+def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> str | None:
+    """The kind of channel in which withheld runs show most that errors of a set's own members do not explain, or None."""
+    found = above_floor(problem, beyond, _modelled(problem, f))
     return max(found, key=lambda each: each.excess_um).kind if found else None
 
 
-def _least(problem: Problem, f: Fitted) -> float:
+def _least(problem: Problem, modelled_um: float) -> float:
     """Smallest excess residual (um at the tip) that makes a set of causes incomplete."""
-    return max(GATE * problem.floor.tip_um, _modelled(problem, f))
+    return max(float(np.sqrt(ABOVE - 1.0)) * problem.floor.tip_um, modelled_um)
 
 
 def _modelled(problem: Problem, f: Fitted) -> float:
@@ -224,7 +232,7 @@ def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[tupl
         if f is best or len(f.members) != len(best.members) or not best.members:
             continue
         behind = 0.5 * (left(f) - left(best))
-        if min(behind, best.log_evidence - f.log_evidence) < SAME_EVIDENCE and _of_their_signs(problem, f):
+        if min(behind, best.log_evidence - f.log_evidence) < EQUAL_LOG_ODDS and _of_their_signs(problem, f):
             found.append((best.members, f.members))
     return found
 

@@ -4,16 +4,17 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from camcomp.diagnosis.search.cause_search import SAME_EVIDENCE, _same
+from camcomp.diagnosis.search.cause_search import _same
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Scale
 from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 
 
 def problem_of(twin):
-    """Rows that follow the first column 0.7 of its scale; the second does the same with 7 of its own, `twin` its share."""
+    """Rows that follow the first column 0.7 of its scale; the second does the same with 10 of its own, `twin` its share."""
     rng = np.random.default_rng(2)
     D = rng.standard_normal((400, 2))
-    D[:, 1] = 0.1 * (twin * D[:, 0] + np.sqrt(1.0 - twin**2) * D[:, 1])
+    D[:, 1] = 0.07 * (twin * D[:, 0] + np.sqrt(1.0 - twin**2) * D[:, 1])
     data = gram(D, 0.7 * D[:, 0] + rng.standard_normal(400))
     one = np.ones(2)
     prior = Prior(1e-3 * one, one, 0.0 * one, np.inf * one)
@@ -36,7 +37,7 @@ def problem_of(twin):
 
 def test_an_unusual_size_alone_excludes_no_set():
     problem, fits = problem_of(twin=1.0)
-    assert fits[0].log_evidence - fits[1].log_evidence > SAME_EVIDENCE
+    assert fits[0].log_evidence - fits[1].log_evidence > EQUAL_LOG_ODDS
     assert _same(problem, fits, fits[0]) == [((0,), (1,))]
 
 

@@ -27,7 +27,9 @@ def present(monkeypatch, column, left, *, surely=False):
     )  # fmt: skip
     monkeypatch.setattr(credible, "_weights", lambda _: [[1.0]])
     amount = float(column @ left / (column @ column))
-    f = Fitted(members=(0,), theta=np.array([amount]), covariance=np.eye(1), log_evidence=0.0, grams=(), residual=(left,))
+    f = Fitted(
+        members=(0,), theta=np.array([amount]), covariance=np.eye(1), log_evidence=0.0, grams=(), residual=(left,)
+    )
     found = credible.credibility(problem, f, surely=surely, temperature=1.5)
     return found.present[0], found.replaced[0]
 
