@@ -5,7 +5,8 @@ With S the parts of a set of causes,
 
     P(cause i) = sum_(S has i, h) p(S, h) / sum_(S, h) p(S, h),      log p(S, h) = log evidence(S, h) / T + log prior(S, h)
 
-A covariate whose functions do the same as the cause, within MODELLED of its size, is the cause under another name.
+A cause has to be sure beside either kind of discrepancy: its probability is the lower one of both. A covariate whose functions
+do the same as the cause, within MODELLED of its size, is the cause under another name.
 
 Sources: Hoeting et al., Statistical Science 14 (1999) 382; Kennedy, O'Hagan, J. R. Statist. Soc. B 63 (2001) 425.
 """
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import log
 
 import numpy as np
 from scipy.special import logsumexp
@@ -45,57 +47,59 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float
         return Credibility({}, {})
     weight = _weights(problem)
     joint = joint_products(problem, f, weight)
-    alone, groups = _alone(problem, f, joint.data), covariates(joint)
-    found = _with_covariates(problem, f, joint, alone, groups)
-    scales = smooth_in_time(problem, f, weight)
-    for data, log_size in scales:
-        found += [
-            replace(each, evidence=each.evidence - log_size, unmodelled=1.0 / len(scales))
-            for each in _alone(problem, f, data)
-        ]
-    if not surely:
-        found += alone
-    of_each = UNKNOWN / (len(groups) + 1)
-    prior = np.array([each.unmodelled * of_each if each.unmodelled else 1.0 - UNKNOWN for each in found])
-    value = np.array([each.evidence / temperature + each.prior for each in found]) + np.log(prior)
+    alone = _alone(problem, f, joint.data, log(1.0 - UNKNOWN))
+    covariate, scales = _with_covariates(problem, f, joint, alone), smooth_in_time(problem, f, weight)
+    prior = log(UNKNOWN) - log(max(len(scales), 1))
+    smooth = [
+        replace(each, evidence=each.evidence - log_size, unmodelled=True)
+        for data, log_size in scales
+        for each in _alone(problem, f, data, prior)
+    ]
+    each_kind = [
+        _present_and_replaced([*kind, *(() if surely else alone)], temperature) for kind in (covariate, smooth) if kind
+    ]
+    present, replaced = np.min([p for p, _ in each_kind], axis=0), np.max([r for _, r in each_kind], axis=0)
+    return Credibility(
+        dict(zip(members, present.tolist(), strict=True)), dict(zip(members, replaced.tolist(), strict=True))
+    )
+
+
+def _present_and_replaced(found: Sequence[_Hypothesis], temperature: float) -> tuple[Floats, Floats]:
+    """Of every member (d,): the probability that it acts, and that something unmodelled acts in its place."""
+    value = np.array([each.evidence / temperature + each.prior for each in found])
     p = np.exp(value - logsumexp(value))
     there = np.array([each.there for each in found])
-    without = (p * (prior != 1.0 - UNKNOWN)) @ (1.0 - there)
-    return Credibility(
-        dict(zip(members, (p @ there).tolist(), strict=True)), dict(zip(members, without.tolist(), strict=True))
-    )
+    return p @ there, (p * [each.unmodelled for each in found]) @ (1.0 - there)
 
 
 @dataclass(frozen=True)
 class _Hypothesis:
-    """A part of a set: log evidence, log prior of the part, and which members of the whole set act.
-
-    unmodelled: share of a covariate's prior probability, 0 where nothing unmodelled acts.
-    """
+    """A part of a set, with something unmodelled or without: log evidence, log prior, which members of the whole set act."""
 
     evidence: float
     prior: float
     there: tuple[float, ...]
-    unmodelled: float = 0.0
+    unmodelled: bool = False
 
 
-def _alone(problem: Problem, f: Fitted, data: Gram) -> list[_Hypothesis]:
-    """Every part of a set by normal equations, with nothing unmodelled in them."""
+def _alone(problem: Problem, f: Fitted, data: Gram, prior: float) -> list[_Hypothesis]:
+    """Every part of a set by normal equations; prior: log prior of what these hold beside the set."""
     at, columns = base(data, problem.prior), problem.candidates.columns
     out = []
     for some in parts_of(f.members):
         value = at.log_evidence - holding_back(at, problem.prior, problem.member_columns(some))
         value += float(log_bayes(at, problem.prior, [[columns[i] for i in some]])[0])
         there = tuple(float(i in some) for i in f.members)
-        out.append(_Hypothesis(value, problem.candidates.prior(some), there))
+        out.append(_Hypothesis(value, problem.candidates.prior(some) + prior, there))
     return out
 
 
 def _with_covariates(
-    problem: Problem, f: Fitted, joint: JointProducts, alone: Sequence[_Hypothesis], groups: Sequence[Ints]
+    problem: Problem, f: Fitted, joint: JointProducts, alone: Sequence[_Hypothesis]
 ) -> list[_Hypothesis]:
     """Every part of a set jointly with functions of every covariate."""
-    columns, theta, first = problem.candidates.columns, list[Floats](), 0
+    columns, theta, first, groups = problem.candidates.columns, list[Floats](), 0, covariates(joint)
+    prior = log(UNKNOWN / (1.0 - UNKNOWN)) - log(max(len(groups), 1))
     for i in f.members:
         theta.append(f.theta[first : (first := first + len(columns[i]))])
     out = []
@@ -110,7 +114,7 @@ def _with_covariates(
                 for has, i, each in zip(own.there, f.members, theta, strict=True)
             )
             gain = float(logsumexp(gains)) - float(np.log(len(gains)))
-            out.append(_Hypothesis(own.evidence + gain, own.prior, there, 1.0))
+            out.append(_Hypothesis(own.evidence + gain, own.prior + prior, there, unmodelled=True))
     return out
 
 

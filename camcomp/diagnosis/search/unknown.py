@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SIZES_OF_PROCESS
+from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SCALES
 from camcomp.diagnosis.model.group import SmoothProcess
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
@@ -46,7 +46,7 @@ def smooth_in_time(problem: Problem, f: Fitted, weight: Sequence[Sequence[float]
     """Normal equations about a fit with a smooth process over the time of every run in the first kind of channel, and the log
     of its size, at every scale of model/discrepancy; weight: of a row, per run and kind.
     """
-    k, scales, rows = len(problem.columns.names), len(LENGTHS["time"]) * len(SIZES_OF_PROCESS), 0.0
+    k, scales, rows = len(problem.columns.names), len(LENGTHS["time"]) * len(SCALES), 0.0
     A, log_size = np.zeros((scales, k + 1, k + 1)), np.zeros(scales)
     for run, (W, r) in enumerate(zip(*about(problem, f), strict=True)):
         joint, at = W.appended(r[:, None]), problem.row_places(run)
@@ -78,7 +78,7 @@ def _add_smooth(A: Floats, log_size: Floats, channels: Sequence[tuple[Ints, Floa
             ]
             for i, (spread, way) in enumerate(known[key]):
                 turned = way.T @ X[region]
-                for j, size in enumerate(SIZES_OF_PROCESS, i * len(SIZES_OF_PROCESS)):
+                for j, size in enumerate(SCALES, i * len(SCALES)):
                     grown = 1.0 + size**2 * np.maximum(spread, 0.0)
                     A[j][np.ix_(on, on)] += turned.T @ (turned / grown[:, None])
                     log_size[j] += 0.5 * float(np.log(grown).sum())
