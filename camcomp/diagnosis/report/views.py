@@ -71,11 +71,11 @@ def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence
     Without a holdout every run is shown with causes chosen and fitted without it.
     """
     problem, count = done.problem, len(done.problem.bench.runs)
-    best = done.search.fits[done.search.verdict.best]
+    best = done.search.sets.best
     answer = problem.causes(best.members, best.theta, best.extra)
     chosen = [answer] * count
     if not holdout:
-        without = causes_without(problem, best, done.search.fits, done.search.probability)
+        without = causes_without(problem, best, done.search.sets.fits, done.search.sets.probability)
         chosen = [list(each.values()) for each in without]
     each_one = not holdout and count > 1
     out = [_view(problem, problem.bench, k, causes, held_out=each_one) for k, causes in enumerate(chosen)]

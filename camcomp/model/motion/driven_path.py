@@ -356,7 +356,7 @@ def _doubt(force: Floats, direction: Floats, time: Floats, cutting: Bools, slack
         near = (time >= time[k] - slack) & (time <= time[k + 1] + slack)
         near[k : k + 2] = True
         if force[k] @ force[k + 1] < 0.0:
-            near |= _stretch(direction @ direction[k] > _STEEP, k)
+            near |= _stretch(direction @ direction[k] > _STEEP, int(k))
         out[near] = np.maximum(out[near], np.abs(change[k]))
     return out
 
