@@ -161,7 +161,7 @@ def judged(effect: str, target: str, machine: str, seed: int, ratio: float, fold
     }  # fmt: skip
     answer, law = done.law, done.result.law
     if effect == "null":  # the search for a law, although nobody asked for one
-        forced = answer or answer_law(done.problem, done.search.fits[done.search.verdict.best], "tip")
+        forced = answer or answer_law(done.problem, done.search.sets.best, "tip")
         return {**row, "law": forced is not None, "formula": None if forced is None else forced.law.formula}
     gaps = [done.problem.bench.gap(k)[:, :3] for k in range(len(own))]
     if law is None or answer is None:
