@@ -192,7 +192,10 @@ def cutting_forces(
     # line numbers corrected for their lag are exact to one row
     slack = CLOCK_S + (float(np.median(np.diff(time))) if aligned.lag else 0.0)
     return Forces(
-        force, np.maximum(_doubt(force, middle, time, on, slack), turning), on, _apart(track, motion) | _waited(tip, time, on)
+        force,
+        np.maximum(_doubt(force, middle, time, on, slack), turning),
+        on,
+        _apart(track, motion) | _waited(tip, time, on),
     )
 
 
