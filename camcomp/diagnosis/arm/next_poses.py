@@ -1,8 +1,7 @@
 """Which poses to measure next: those that tell most about what is still uncertain, chosen one by one and then exchanged.
 
 What a pose tells is its expected information about the effects of a linearised model, beside a frame of its own that the
-new campaign brings along (log det; Fedorov, Theory of Optimal Experiments, 1972), or, where poses of interest are given, by
-how much it narrows the error of the tip there.
+new campaign brings along (log det; Fedorov, Theory of Optimal Experiments, 1972).
 """
 
 from __future__ import annotations
@@ -33,12 +32,9 @@ class Design:
     covariance: Floats
 
 
-def designed(X: Floats, covariance: Floats, noise: float, count: int, interest: Floats | None = None) -> Design:
-    """`count` of n candidates with rows X (n, 3, k) under a prior covariance (k, k), noise mm per coordinate.
-
-    interest (m, 3, k): rows of poses whose error is to become small; without them the information itself counts.
-    """
-    belief = _Belief(X, covariance, noise, interest)
+def designed(X: Floats, covariance: Floats, noise: float, count: int) -> Design:
+    """`count` of n candidates with rows X (n, 3, k) under a prior covariance (k, k), noise mm per coordinate."""
+    belief = _Belief(X, covariance, noise)
     chosen: list[int] = []
     for _ in range(min(count, len(X))):
         chosen.append(belief.take(belief.best(chosen)))
@@ -53,20 +49,14 @@ def designed(X: Floats, covariance: Floats, noise: float, count: int, interest: 
 class _Belief:
     """Posterior covariance of the effects after some poses, updated pose by pose."""
 
-    def __init__(self, X: Floats, covariance: Floats, noise: float, interest: Floats | None) -> None:
+    def __init__(self, X: Floats, covariance: Floats, noise: float) -> None:
         self.X, self.covariance = X, covariance.copy()
         self.square = noise**2 * np.eye(3)
-        self.interest = interest
         self.spread = np.einsum("nik,kl,njl->nij", X, covariance, X, optimize=True)  # of every candidate's tip
 
     def best(self, without: list[int]) -> int:
         """The most informative candidate outside of `without`."""
-        if self.interest is None:
-            value = np.linalg.slogdet(np.eye(3) + self.spread / self.square[0, 0])[1]
-        else:
-            toward = np.einsum("mik,kl,njl->minj", self.interest, self.covariance, self.X, optimize=True)
-            narrow = np.linalg.inv(self.spread + self.square)
-            value = np.einsum("minj,njl,minl->n", toward, narrow, toward, optimize=True)
+        value = np.linalg.slogdet(np.eye(3) + self.spread / self.square[0, 0])[1]
         value = np.array(value)
         value[without] = -np.inf
         return int(np.argmax(value))

@@ -281,23 +281,6 @@ def drawn(poses: Poses) -> Poses:
 # -- result -------------------------------------------------------------------------------------------------------------
 
 
-def study(
-    robot: Robot,
-    causes: Sequence[Cause],
-    runs: Sequence[Poses],
-    *,
-    holdout: Sequence[str] = (),
-    without: Sequence[str] = (),
-    stated: StatedDeviation | None = None,
-) -> DiagnosisResult:
-    """Result for static poses of an arm. runs: one entry per run, whose label is its campaign (clamping).
-
-    holdout: names of runs (`Poses.run`) that are judged and never fitted. Raises ValueError when a campaign has too few poses
-    for its frames.
-    """
-    return studied(robot, causes, runs, holdout=holdout, without=without, stated=stated)[0]
-
-
 def studied(
     robot: Robot,
     causes: Sequence[Cause],
@@ -307,7 +290,11 @@ def studied(
     without: Sequence[str] = (),
     stated: StatedDeviation | None = None,
 ) -> tuple[DiagnosisResult, tuple[str, ...]]:
-    """The result of `study`, and notes for the reader of the logs."""
+    """Result for static poses of an arm, and notes for the reader of the logs.
+
+    runs: one entry per run, whose label is its campaign (clamping). holdout: names of runs (`Poses.run`) that are judged and
+    never fitted. Raises ValueError when a campaign has too few poses for its frames.
+    """
     with progress.part(0.0, 0.7):
         case = solve(
             robot=robot, causes=causes, runs=runs, holdout=holdout, without=without,

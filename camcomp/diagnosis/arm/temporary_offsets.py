@@ -9,14 +9,12 @@ import numpy as np
 from camcomp.diagnosis.arm.poses import ArmBench, Column
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.folds import without_nuisances
+from camcomp.diagnosis.model.window import best_window
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 
 EFFECT = "disturbance"
 SHORTEST = 4  # poses: fewer are outliers
-LONGEST = 0.7  # of a campaign's poses: a temporary offset lasts at most so long
-LEAST_FREE = 0.02  # of a temporary offset's squares that frames have to leave
-STEP = 256  # begins that are looked at together
 
 
 def temporary_offsets(
@@ -37,8 +35,9 @@ def temporary_offsets(
         if n < 3 * SHORTEST or not poses.has_clock:
             continue
         left = without_nuisances(rest[k], frames[k])[order]
+        basis = np.linalg.qr(frames[k][order].reshape(3 * n, -1))[0].reshape(n, 3, -1)
         for a, drive in enumerate(bench.robot.actuators):
-            begin, end = _window(joints[k][order, :, a], left, frames[k][order])
+            _, begin, end = best_window(joints[k][order, :, a], left, basis, np.arange(n + 1), SHORTEST)
             if begin == end:
                 continue
             edges = [_between(time, begin), _between(time, end)]
@@ -57,27 +56,3 @@ def _between(time: Floats, k: int) -> tuple[float, float, float]:
     margin = 1.0 if k in (0, len(time)) else 0.0
     value = 0.5 * (before + after) + (margin if k == len(time) else -margin)
     return float(value), float(time[max(k - 2, 0)] - margin), float(time[min(k + 1, len(time) - 1)] + margin)
-
-
-def _window(joint: Floats, left: Floats, frame: Floats) -> tuple[int, int]:
-    """First row and end row of the temporary offset that reduces the squares of left (n, 3) most, the frames fitted
-    jointly.
-    """
-    n = len(left)
-    Q = np.linalg.qr(frame.reshape(-1, frame.shape[2]))[0].reshape(n, 3, -1)
-    said = np.concatenate([[0.0], np.cumsum((joint * left).sum(axis=1))])
-    size = np.concatenate([[0.0], np.cumsum((joint**2).sum(axis=1))])
-    taken = np.concatenate([np.zeros((1, Q.shape[2])), np.cumsum(np.einsum("ni,nik->nk", joint, Q), axis=0)])
-    best, found = 0.0, (0, 0)
-    ends = np.arange(n + 1)
-    for start in range(0, n, STEP):
-        begin = np.arange(start, min(start + STEP, n))
-        rows = ends[None, :] - begin[:, None]
-        free = size[None, :] - size[begin, None] - ((taken[None, :] - taken[begin, None]) ** 2).sum(axis=2)
-        whole = size[None, :] - size[begin, None]
-        good = (rows >= SHORTEST) & (rows <= LONGEST * n) & (free > LEAST_FREE * whole)
-        gain = np.where(good, (said[None, :] - said[begin, None]) ** 2 / np.where(good, free, 1.0), 0.0)
-        i, j = np.unravel_index(int(np.argmax(gain)), gain.shape)
-        if gain[i, j] > best:
-            best, found = float(gain[i, j]), (int(begin[i]), int(j))
-    return found

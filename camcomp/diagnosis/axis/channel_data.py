@@ -9,6 +9,7 @@ import numpy as np
 
 from camcomp.diagnosis.axis.effect_columns import AxisCause
 from camcomp.diagnosis.axis.gate import within_a_row
+from camcomp.diagnosis.axis.row_noise import noise_of
 from camcomp.ground.datatypes import Floats
 
 HEALTHY_SHARE = 0.3  # of the channel's size: scale of a size that every axis has
@@ -47,7 +48,7 @@ class ChannelData:
         return np.concatenate([*self.healthy[run].values()], axis=1)
 
     def residual_of(self, run: int, left: Sequence[Floats]) -> ChannelData:
-        """Residuals (n,) of one run beside a constant; left: of every run."""
+        """Residuals (n,) of one run, to which a constant is fitted; left: of every run."""
         one = [{"offset": np.ones((len(each), 1))} for each in left]
         return replace(self, values=left, healthy=one, train=[run], level=0.0, clock=0.0)
 
@@ -78,3 +79,22 @@ class ChannelData:
             self, healthy=[{**own, CLOCK: each} for own, each in zip(self.healthy, slopes, strict=True)],
             noise=[np.hypot(1.0, within_a_row(each) / self.floor) for each in inertia],
         )  # fmt: skip
+
+
+def healthy_sizes(columns: Sequence[Sizes], values: Sequence[Floats], floor: float) -> tuple[dict[str, Floats], Floats]:
+    """Sizes by kind that every axis has in values (n,) per run, under their prior, with their covariance.
+
+    floor: least noise of a row. The prior is that of `fit_channel`.
+    """
+    X = np.concatenate([np.concatenate([*own.values()], axis=1) for own in columns])
+    y = np.concatenate([*values])
+    rms = np.sqrt(np.mean(X**2, axis=0))
+    scale = np.where(rms > 0.0, rms, 1.0)  # columns of zeros keep their prior
+    X = X / scale
+    left = y - X @ np.linalg.lstsq(X, y, rcond=1e-9)[0]
+    sd = noise_of(left, floor)
+    prior = max(HEALTHY_SHARE * float(np.sqrt(np.mean(y**2))), 1e-6 * sd)
+    inverse = np.linalg.inv(X.T @ X / sd**2 + np.eye(X.shape[1]) / prior**2)
+    mean = inverse @ (X.T @ y) / sd**2 / scale
+    ends = np.cumsum([own.shape[1] for own in columns[0].values()])[:-1]
+    return dict(zip(columns[0], np.split(mean, ends), strict=True)), inverse / np.outer(scale, scale)

@@ -14,18 +14,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.axis.channel_data import HEALTHY_SHARE, ChannelData, Sizes
+from camcomp.diagnosis.axis.channel_data import ChannelData
 from camcomp.diagnosis.axis.effect_columns import AxisCause
 from camcomp.diagnosis.axis.gate import KNOWN
+from camcomp.diagnosis.axis.row_noise import noise_of
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
 from camcomp.diagnosis.model.discrepancy import covariate_columns, gains_of_more, smooth_functions
 from camcomp.diagnosis.model.evidence import Background, LinearModel
 from camcomp.diagnosis.model.explain import Explanation, posterior_of
 from camcomp.diagnosis.model.group import Group
+from camcomp.diagnosis.model.imitation import probability_with_unmodelled
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.model.search import search_sets
 from camcomp.diagnosis.result.types import Estimate, FoundCause
+from camcomp.diagnosis.statistics.probability import stated
 from camcomp.ground.datatypes import Floats
 
 STEP = 1e-3  # of an amplitude in scales, for slopes
@@ -37,10 +40,11 @@ SHAPE_SD = 1.5  # of the logarithm of a shape: scans of shapes span four
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChannelFit:
-    """What the model says of a channel: causes, healthy sizes by kind with their covariance, and residuals per run.
+    """The model of a channel: causes, healthy sizes by kind with their covariance, and residuals per run.
 
     acting: the causes with their amplitudes. columns (n, k): of these and the healthy sizes, of the fitted runs. drivers: covariate of the dictionary that is more likely than not ->
     share of the residual's energy. hints: the same, where nothing but such functions makes rows of the residual alike.
+    imitated: probability of every cause where the residual shows something unmodelled.
     """
 
     causes: tuple[FoundCause, ...]
@@ -51,6 +55,13 @@ class ChannelFit:
     columns: Floats
     drivers: Mapping[str, float]
     hints: Mapping[str, float]
+    imitated: tuple[float, ...] = ()
+
+    def with_unmodelled(self) -> ChannelFit:
+        """The fit with probabilities of causes jointly with an unmodelled effect."""
+        both = zip(self.causes, self.imitated, strict=False)
+        causes = [c.model_copy(update={"probability": min(c.probability, stated(p))}) for c, p in both]
+        return replace(self, causes=(*causes, *self.causes[len(causes) :]))
 
     def combined(self, weights: Mapping[str, Sequence[float]]) -> Estimate:
         """A sum of healthy sizes, by kind, with its 95 % interval."""
@@ -70,7 +81,7 @@ class _Linear:
 
 
 def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
-    """The most probable causes of a channel, their sizes, and what is left."""
+    """The most probable causes of a channel, their sizes and the residual."""
     at = [np.zeros(len(t.parameters)) for t in terms]
     for again in range(PASSES + 1):
         responses = [_columns(data, terms, k, at) for k in range(len(data.values))]
@@ -138,27 +149,8 @@ def _settled(
     return linear
 
 
-def healthy_sizes(columns: Sequence[Sizes], values: Sequence[Floats], floor: float) -> tuple[dict[str, Floats], Floats]:
-    """Sizes by kind that every axis has in values (n,) per run, under their prior, with their covariance.
-
-    floor: least noise of a row. The prior is that of `fit_channel`.
-    """
-    X = np.concatenate([np.concatenate([*own.values()], axis=1) for own in columns])
-    y = np.concatenate([*values])
-    rms = np.sqrt(np.mean(X**2, axis=0))
-    scale = np.where(rms > 0.0, rms, 1.0)  # columns of zeros keep their prior
-    X = X / scale
-    left = y - X @ np.linalg.lstsq(X, y, rcond=1e-9)[0]
-    sd = _noise_of(left, floor)
-    prior = max(HEALTHY_SHARE * float(np.sqrt(np.mean(y**2))), 1e-6 * sd)
-    inverse = np.linalg.inv(X.T @ X / sd**2 + np.eye(X.shape[1]) / prior**2)
-    mean = inverse @ (X.T @ y) / sd**2 / scale
-    ends = np.cumsum([own.shape[1] for own in columns[0].values()])[:-1]
-    return dict(zip(columns[0], np.split(mean, ends), strict=True)), inverse / np.outer(scale, scale)
-
-
 def _columns(data: ChannelData, terms: Sequence[AxisCause], k: int, at: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Columns (n, k) of all terms beside those that act, and what their tangents miss at 0 (n,)."""
+    """Columns (n, k) of all terms jointly with those that act, and the error of their tangents at 0 (n,)."""
     acting = {i: (term, own) for i, (term, own) in enumerate(zip(terms, at, strict=True)) if own.any()}
     here = data.response(k, [*acting.values()])
     columns, offset = [np.zeros((len(here), 0))], here.copy()
@@ -241,12 +233,7 @@ def _noise(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> flo
     y = data.in_floors({k: data.values[k] - responses[k][1] for k in data.train})
     size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
     left = y - A / size @ np.linalg.lstsq(A / size, y, rcond=1e-9)[0]
-    return _noise_of(left, data.floor)
-
-
-def _noise_of(left: Floats, floor: float) -> float:
-    """Standard deviation of a row of residuals (n,) that counts as one of its own."""
-    return max(float(np.sqrt(np.mean(left**2) * rows_together(left))), floor)
+    return noise_of(left, data.floor)
 
 
 def _explained(
@@ -283,6 +270,7 @@ def _explained(
         candidates=tuple(placed),
         bounds=bounds,
         healthy=dict.fromkeys(unit, 1.0),
+        floors=sd / data.floor,
     )
     data_of = model.reduced(Background())
     values = search_sets(data_of, CAUSES).values if on is None else {on: max(data_of.value(on), -1e300)}
@@ -336,7 +324,7 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     left, amount, sizes = _left(data, terms, linear)
     spreads = _spreads_of_shapes(data, terms, linear, amount)
     scale = calibration_of("axes")
-    causes, acting = [], []
+    causes, acting, effects = [], [], dict[int, Floats]()
     whole = sum(float(np.sum((data.values[k] - data.level) ** 2)) for k in data.train)
     for i in found.members:
         term, columns = terms[i], list(model.candidates[i].columns)
@@ -347,6 +335,7 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
         rest = sum(float(np.sum(left[k] ** 2)) for k in data.train)
         half = 1.96 * scale.interval * np.sqrt(np.diag(covariance)[columns]) + KNOWN * np.abs(amount[i])
         acting.append((term, amount[i]))
+        effects[i] = np.concatenate(own)
         causes.append(
             FoundCause(
                 effect=term.effect, target=term.target,
@@ -356,24 +345,58 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
             )
         )  # fmt: skip
     train = [left[k] for k in data.train]
-    drivers, hints = ({n: _share_of(linear, n, train, sd) for n in own} for own in _named(data, linear, left, sd))
+    gains = _gains_of_functions(data, linear, left, sd)
+    drivers, hints = ({n: _share_of(linear, n, train, sd) for n, gain in each.items() if gain > 0.0} for each in gains)
     return ChannelFit(
         causes=tuple(causes), acting=tuple(acting), sizes=sizes, covariance=among, left=left, drivers=drivers,
-        hints=hints, columns=_design(linear),
+        hints=hints, columns=_design(linear), imitated=_imitated(data, linear, effects, left=train, gains=gains[1], sd=sd),
     )  # fmt: skip
 
 
-def _design(linear: _Linear) -> Floats:
-    """Columns (n, k) of the causes that act and of healthy sizes, in all rows that were fitted."""
-    model = linear.model
+def _imitated(
+    data: ChannelData, linear: _Linear, effects: Mapping[int, Floats], *, left: Sequence[Floats],
+    gains: Mapping[str, float], sd: float,
+) -> tuple[float, ...]:  # fmt: skip
+    """Probabilities of causes with effects (n,), jointly with the excess of residuals (n,) of the fitted runs over the floor."""
+    excess = float(np.sqrt(max(float(np.mean(np.concatenate(left) ** 2)) - data.floor**2, 0.0)))
+    functions = {
+        name: (
+            gains.get(name, 0.0), np.concatenate([smooth_functions(data.covariates[k][name], *ends) for k in data.train])
+        )
+        for name, ends in _ends(data).items()
+    }  # fmt: skip
+    return tuple(
+        probability_with_unmodelled(
+            effect, _design(linear, i), functions, excess=excess, floor=data.floor, noise=sd,
+            odds=_prior_odds(linear.found, i),
+        )
+        for i, effect in effects.items()
+    )  # fmt: skip
+
+
+def _prior_odds(found: Explanation, i: int) -> float:
+    """Log prior odds of a member of the most probable set."""
+    others = tuple(j for j in found.members if j != i)
+    return found.data.prior(found.members) - found.data.prior(others)
+
+
+def _design(linear: _Linear, without: int | None = None) -> Floats:
+    """Columns (n, k) of the causes that act, but for one, and of healthy sizes, in all rows that were fitted, per standard
+    deviation of their amplitudes before the data.
+    """
+    model, slab = linear.model, linear.found.data.slab(linear.found.members)
     slots = [j for kind in linear.unit for j in range(*model.layout.covariates[kind].indices(model.layout.size))]
-    on = [*(j for i in linear.found.members for j in model.candidates[i].columns), *slots]
-    return np.concatenate([model.layout.design(g)[:, 0, on] for g in model.groups])
+    members = (i for i in linear.found.members if i != without)
+    on = [*(j for i in members for j in model.candidates[i].columns), *slots]
+    width = np.array([slab.get(j, 1.0) for j in on])
+    return np.asarray(np.concatenate([model.layout.design(g)[:, 0, on] for g in model.groups]) * width, float)
 
 
-def _named(data: ChannelData, linear: _Linear, left: Sequence[Floats], sd: float) -> tuple[set[str], set[str]]:
-    """Covariates whose function of the residual (n,) is more likely than not, and the same where the noise is what these
-    functions leave.
+def _gains_of_functions(
+    data: ChannelData, linear: _Linear, left: Sequence[Floats], sd: float
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Log Bayes factor of a function of every covariate for the residual (n,), priors included, and the same where the
+    noise is what these functions leave.
     """
     found, model, ends = linear.found, linear.model, _ends(data)
     functions = {
@@ -381,11 +404,14 @@ def _named(data: ChannelData, linear: _Linear, left: Sequence[Floats], sd: float
         for k in data.train
     }
     y, B = data.in_floors(dict(enumerate(left))), data.in_floors(functions)
-    rest = _noise_of(y - B @ np.linalg.lstsq(B, y, rcond=1e-9)[0], data.floor)
+    rest = noise_of(y - B @ np.linalg.lstsq(B, y, rcond=1e-9)[0], data.floor)
     out = []
     for factor in (1.0, min(rest / sd, 1.0)):
-        gains = gains_of_more(model, replace(found.background, noise=factor), found.members)
-        out.append({b.scales[-1][0] for b, gain in gains.items() if b.scales and gain > 0.0})
+        best: dict[str, float] = {}
+        for b, gain in gains_of_more(model, replace(found.background, noise=factor), found.members).items():
+            if b.scales:
+                best[b.scales[-1][0]] = max(gain, best.get(b.scales[-1][0], -np.inf))
+        out.append(best)
     return out[0], out[1]
 
 
@@ -461,14 +487,3 @@ def _spreads_of_shapes(
     for place, (i, name) in enumerate(names):
         out.setdefault(i, {})[name] = float(np.sqrt(max(inverse[place, place], 0.0)) / size[place])
     return out
-
-
-def rows_together(left: Floats) -> float:
-    """Rows that count as one: the integral of the autocorrelation of residuals (n,) up to its first zero, both ways."""
-    centred = left - left.mean()
-    n = len(centred)
-    power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
-    rho = np.fft.irfft(power)[:n]
-    rho = rho / max(float(rho[0]), 1e-300)
-    ends = np.flatnonzero(rho <= 0.0)
-    return float(1.0 + 2.0 * rho[1 : ends[0] if len(ends) else n].sum())

@@ -10,11 +10,11 @@ from scipy.linalg import block_diag
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from camcomp.diagnosis.axis.terms import AxisTravel
+from camcomp.diagnosis.model.window import best_window
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 CELL_S = 0.02  # in which a window begins and ends, before it is placed to a row
-SHORTEST_S, LONGEST = 0.2, 0.6  # of a window; of its run: what lasts longer is how the run is
-LEAST_OWN = 0.1  # of a window's rows, that what is fitted beside it has to leave of it
+SHORTEST_S = 0.2  # of a window
 LEVEL = 0.5  # of the shift: every quarter of a window has to show it to within that
 QUARTERS = 4
 LEAST_SIZE = 2.0  # of the floor, that a push has to be: a force's zero wanders by less
@@ -50,22 +50,10 @@ def find_window(
     for k, rest in rests.items():
         step = float(np.median(np.diff(times[k])))
         cell = max(round(CELL_S / step), 1, len(rest) // 400)
-        edges = np.arange(0, len(rest) - cell + 1, cell)
-        i, j = np.triu_indices(len(edges), max(round(SHORTEST_S / (cell * step)), 2))
-        n = edges[j] - edges[i]
-        some = n < LONGEST * len(rest)
-        i, j, n = i[some], j[some], n[some]
-        if not len(n):
-            continue
-        sums = np.concatenate(
-            [np.zeros((1, bases[k].shape[1] + 1)), np.cumsum(np.column_stack([bases[k], rest]), axis=0)]
-        )
-        inside = sums[edges[j]] - sums[edges[i]]
-        own = n - np.sum(inside[:, :-1] ** 2, axis=1)  # of the window, beside the columns
-        score = np.where(own > LEAST_OWN * n, inside[:, -1] ** 2 / np.maximum(own, 1e-300), 0.0)
-        at = int(np.argmax(score))
-        if best is None or score[at] > best[0]:
-            best = float(score[at]), k, int(edges[i[at]]), int(edges[j[at]])
+        edges, shortest = np.arange(0, len(rest) - cell + 1, cell), cell * max(round(SHORTEST_S / (cell * step)), 2)
+        score, first, last = best_window(np.ones((len(rest), 1)), rest[:, None], bases[k][:, None], edges, shortest)
+        if score > (best[0] if best else 0.0):
+            best = score, k, first, last
     if best is None:
         return None
     _, k, first, last = best

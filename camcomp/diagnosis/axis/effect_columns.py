@@ -17,8 +17,9 @@ from typing import Any, Literal
 import numpy as np
 
 from camcomp.diagnosis.axis.findings import AxisRun
+from camcomp.diagnosis.axis.predicted import depends_on_start
 from camcomp.ground import shelf
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Motion, Parameter, applies
 from camcomp.model.hysteresis import direction
@@ -30,7 +31,6 @@ from camcomp.model.statics.description import Actuator, Robot
 from camcomp.model.statics.masses import MassLoads
 
 ChannelName = Literal["following", "behind", "force"]
-STAGE_OF: Mapping[ChannelName, str] = {"following": "control", "behind": "drive", "force": "drive"}
 # of standing poses; of an interval that is searched; laws; a zero of an encoder
 ELSEWHERE = ("joint_hysteresis", "joint_curve", "disturbance", "formula", "map", "joint_offset")
 
@@ -129,7 +129,7 @@ class DrivenAxis:
         return replace(plain, held=lambda: self.weight[:, None]) if self.weight.any() else plain
 
     def channel(self, name: ChannelName, causes: Sequence[Cause]) -> Floats:
-        """What causes add to a channel (n,), in the study's mm or N: set-point - encoder, load - encoder, drive force."""
+        """Effect of causes on a channel (n,), in the study's mm or N: set-point - encoder, load - encoder, drive force."""
         names = (self.actuator.name,)
         if name == "following":
             late = signal_path.controlled(causes, names, self.asked)
@@ -142,8 +142,14 @@ class DrivenAxis:
         softer = sum(self._compliance(cause) - self._compliance(None) for cause in causes)
         return np.asarray(self.lever * (error[:, 0] - softer * self.weight), float)
 
+    def known(self, causes: Sequence[Cause]) -> Bools:
+        """Rows (n,) in which causes of the control do not depend on how the axis moved before its log began."""
+        start = np.full((1, 1), self.run.encoder[0] / self.lever)
+        unsure = depends_on_start(causes, self.asked, start, np.full(1, self.lever))[:, 0]
+        return np.asarray(np.interp(self.run.time, self.asked.time, unsure) == 0.0)
+
     def laws(self, texts: Sequence[str], causes: Sequence[Cause]) -> Floats:
-        """What formulas at the stage control, behind causes, add to the following error (n, q), in the study's mm."""
+        """Effect of formulas at the stage control, behind causes, on the following error (n, q), in the study's mm."""
         late = signal_path.controlled(causes, (self.actuator.name,), self.asked)
         rows = DriveRows(self.asked, 0, followed=late[:, 0])
         added = [parse(text, AT_DRIVE)(rows, rows.rows) for text in texts]
@@ -211,8 +217,7 @@ def parameters_of(module: Any, hinge: bool) -> tuple[Parameter, ...]:
     if hinge and not hasattr(module, "ROTARY") and "drive" in signal_path.stages_of(module):
         own = tuple(p for p in own if p.unit == "1")  # lengths of a slide mean nothing to a hinge
     own = tuple(module.ROTARY) if hinge and hasattr(module, "ROTARY") else own
-    free = {(p.name, p.nominal): p for p in module.PARAMETERS}  # with bounds of the file: a lag may be a lead
-    return tuple(p if p.shape else free.get((p.name, p.nominal), p) for p in own)
+    return own
 
 
 def _acts(name: str, module: Any, axis: DrivenAxis, channel: ChannelName) -> bool:

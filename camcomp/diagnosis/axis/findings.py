@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.diagnosis.axis.block_least_squares import Series
 from camcomp.diagnosis.axis.gate import AxisGate
 from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, spikes
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
@@ -23,6 +22,7 @@ FIRST_MOVE_MM = 0.2  # after which friction has its sense
 MOVING = 0.1  # of the fastest row's way
 FAR = 10.0  # times as far goes an axis that moves
 ANSWER_S = (0.02, 0.3)  # ahead of a push, and behind it until a loop has answered
+BLOCKS = 25  # of all runs, in which the size of a residual is compared
 GAP_MARGIN_ROWS = 5  # rows of which a gap leaves speed and acceleration uncertain
 
 
@@ -159,13 +159,19 @@ class AxisDeviation:
         return AxisDeviation(None if rad is None else ARM_LENGTH * rad, None if torque is None else torque / ARM_LENGTH)
 
 
+def block_squares(values: Sequence[Floats]) -> Floats:
+    """Mean squares (b,) of values (n,) per run in BLOCKS blocks of equally many rows."""
+    each = max(BLOCKS // len(values), 2)
+    return np.array([np.mean(part**2) for own in values for part in np.array_split(own, each)])
+
+
 @dataclass(eq=False, kw_only=True)
 class AxisChannel:
-    """One channel of one axis: what was fitted, block by block."""
+    """One channel of one axis: values, residuals and their sizes block by block."""
 
-    data: Series
+    values: list[Floats]  # per fitted run
     runs: list[int]
-    first: Floats  # mean squares of withheld blocks without causes
+    first: Floats  # mean squares of blocks without causes
     last: Floats
     columns: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (n, k) of what was fitted
     moves: list[AxisTravel] = field(default_factory=list)
@@ -184,13 +190,15 @@ class AxisChannel:
     names: list[str] = field(default_factory=list)  # of the runs that the gate has seen
     gate: AxisGate | None = None
 
-    @property
-    def residual(self) -> Series:
-        """Residuals of the fitted rows; `columns` are tangents of what was fitted to them."""
-        return replace(self.data, y=np.concatenate(self.left))
+    def keep_held(self, run: int, rows: Bools) -> None:
+        """Judge a withheld run by some of its rows (n,) alone, where there are any."""
+        if rows.any() and not rows.all():
+            for each in (self.held, self.held_whole, self.held_times):
+                each[run] = each[run][rows]
+            self.first, self.last = (block_squares([*each.values()]) for each in (self.held_whole, self.held))
 
     def followed(self, runs: Sequence[AxisRun]) -> list[Floats]:
-        """Positions (n,) of runs by the fit of a following error: encoders without what it leaves."""
+        """Positions (n,) of runs by the fit of a following error: encoders without its residual."""
         paths = [run.encoder.copy() for run in runs]
         fitted = {k: (m.time, left) for k, m, left in zip(self.runs, self.moves, self.left, strict=True)}
         for k, (time, left) in {**fitted, **{k: (self.held_times[k], left) for k, left in self.held.items()}}.items():

@@ -46,25 +46,16 @@ class AxisGate:
     intervals: tuple[Interval, ...]
 
 
-def judge(
-    inside: Sequence[Floats], left: Sequence[Floats], times: Sequence[Floats], floor: float, offset: float = 0.0
-) -> AxisGate:
-    """Judge residuals (n,) mm or N per run against a floor.
-
-    left, times: of withheld rows. inside: residuals with all rows fitted; a residual that vanishes then was
-    undetermined by the rows, and no unknown effect. offset: repeatability, the constant by which runs may differ.
-    """
-    inside, left = ([each - np.clip(each.mean(), -offset, offset) for each in part] for part in (inside, left))
-    own = inside if [len(each) for each in inside] == [len(each) for each in left] else None
-    found, chance = intervals(left, times, floor, own)
+def judge(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> AxisGate:
+    """Judge residuals (n,) mm or N per run at times (n,) s against a floor."""
+    found, chance = intervals(left, times, floor)
     floor = max(floor, 1e-12)
     parts = max(STRETCHES // len(left), 2)
     size = np.array([energy(part, floor) for run in left for part in np.array_split(run, parts)]) / floor**2
-    fitted = float(np.mean([energy(part, floor) for run in inside for part in np.array_split(run, parts)])) / floor**2
     spread = float(size.std(ddof=1)) / np.sqrt(len(size))
     spread, freedom = max(spread, 1e-12), len(size) - 1
     sure = float(student.ppf(0.99, freedom)) * spread
-    if size.mean() - sure > ABOVE and fitted > ABOVE:
+    if size.mean() - sure > ABOVE:
         by_size = float(student.logsf((size.mean() - ABOVE) / spread, freedom) / np.log(10.0))
         return AxisGate("above", min(chance, by_size), found)
     if found:
@@ -91,13 +82,10 @@ def energy(left: Floats, floor: float) -> float:
     return max(float(np.mean(slow**2)) - beyond, 0.0) + noise
 
 
-def intervals(
-    left: Sequence[Floats], times: Sequence[Floats], floor: float, inside: Sequence[Floats] | None = None
-) -> tuple[tuple[Interval, ...], float]:
+def intervals(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> tuple[tuple[Interval, ...], float]:
     """Stretches in which the mean square is above the floor, and out of what other stretches show (1 % over all of them).
 
-    inside: the same rows where everything is fitted, in which a stretch has to be above the floor as well: the only one in
-    which an axis speeds up has nothing to be judged by. With log10 of the chance of the most conspicuous stretch.
+    With log10 of the chance of the most conspicuous stretch.
     """
     stretches = [
         (k, rows)
@@ -118,8 +106,6 @@ def intervals(
     chances = norm.logsf((log - middle) / max(spread, 1e-12)) / np.log(10.0) + np.log10(len(stretches))
     out = (chances < np.log10(FALSE)) & (size > LOCAL * floor**2) & (size > pure * np.exp(middle))
     out &= np.array([_going_on(left[k][rows]) for k, rows in stretches]) > GOING_ON * floor**2
-    if inside is not None:
-        out &= np.array([energy(inside[k][rows], floor) for k, rows in stretches]) > LOCAL * floor**2
     joined: list[Interval] = []
     for i in np.flatnonzero(out).tolist():
         k, rows = stretches[i]

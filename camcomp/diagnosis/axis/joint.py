@@ -17,13 +17,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.block_least_squares import by_block, gain, log10_chance, series, withheld
-from camcomp.diagnosis.axis.channel_data import TURNING, ChannelData, Response
-from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel, healthy_sizes
+from camcomp.diagnosis.axis.channel_data import TURNING, ChannelData, Response, healthy_sizes
+from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel
 from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
-from camcomp.diagnosis.axis.findings import FAR, FIRST_MOVE_MM, ROWS, AxisChannel, AxisFindings, AxisRun
+from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisFindings, AxisRun, block_squares
 from camcomp.diagnosis.axis.gate import WITHIN, judge, not_known
+from camcomp.diagnosis.axis.row_noise import log_gain
 from camcomp.diagnosis.axis.terms import AxisTravel, ripple, travel
 from camcomp.diagnosis.law.words import law_sum
 from camcomp.diagnosis.model.noise import MINOR
@@ -45,7 +45,7 @@ LEAST_ARM = 1e-3  # of a direction, or of an arm of 1 m: by which a weight has t
 
 @dataclass(frozen=True, eq=False)
 class AxisSurroundings:
-    """What the model of an axis needs beside its own log: the machine, and how all axes moved.
+    """Surroundings of an axis for its model: the machine, and how all axes moved.
 
     axes: runs by axis name, in the study's mm per lever.
     """
@@ -143,7 +143,7 @@ class JointRows:
 def study_channel(
     found: AxisFindings, rows: JointRows, around: AxisSurroundings, without: set[str]
 ) -> tuple[AxisFindings, AxisChannel]:
-    """What was found on an axis, with one more channel and its causes."""
+    """Findings on an axis with one more channel and its causes."""
     found = replace(found, causes=[*found.causes], unknown_in=[*found.unknown_in], details={**found.details})
     seen = [np.isin(run.time, m.time) for run, m in zip(rows.runs, rows.moves, strict=True)]
     axes = [around.driven(found.name, run) for run in rows.runs]
@@ -177,28 +177,37 @@ def study_channel(
         found.pushed = [
             (str(p.run), p.shape["from_s"] - start[str(p.run)], p.shape["to_s"] - start[str(p.run)]) for p in pushes
         ]
-    found.causes += done.causes
     if rows.channel == "behind":  # without zeros and clocks of two encoders, the rest is an error of the machine
         apart = [sum(own[kind] @ done.sizes[kind] for kind in ("offset", "delay")) for own in data.healthy]
         rows = replace(rows, values=[each - own for each, own in zip(rows.values, apart, strict=True)])
     channel = _channel(rows, done, data.response)
+    if following and done.acting:  # how well other rows are predicted says nothing of the causes
+        for k in rows.test:
+            channel.keep_held(k, axes[k].known([term.cause(own.tolist()) for term, own in done.acting])[seen[k]])
     _tell(found, rows, done, data.healthy)
     if rows.channel == "force" and not rows.runs[0].revolute:
-        line = ripple([rows.moves[k] for k in rows.train], [done.left[k] for k in rows.train])
-        if line is not None and line.amplitude**2 / 2.0 > (MINOR * rows.floor) ** 2:
-            found.ripple = line
-            waves = [wave(2.0 * np.pi * _positions(rows) / line.period) for wave in (np.sin, np.cos)]
-            before, after = (
-                withheld(channel.residual, np.column_stack([channel.columns, *more])) for more in ([], waves)
-            )
-            found.unknown_chance = min(found.unknown_chance, log10_chance(gain(before, after), line.tried))
+        _find_ripple(found, channel)
     if channel.gate is not None and channel.gate.word == "open" and done.drivers:
         channel.gate = replace(channel.gate, word="above")  # the size does not tell, a covariate does
     if channel.gate is not None:
         found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
         if channel.gate.word == "above":
+            done = done.with_unmodelled()
             found.unknown_in += sorted((done.drivers or done.hints).items(), key=lambda each: -each[1])
+    found.causes += done.causes
     return found, channel
+
+
+def _find_ripple(found: AxisFindings, channel: AxisChannel) -> None:
+    """A line of the residual of a drive force over the travel, where it is larger than on healthy machines."""
+    line = ripple(channel.moves, channel.left)
+    if line is None or line.amplitude**2 / 2.0 <= (MINOR * channel.floor) ** 2:
+        return
+    found.ripple = line
+    phase = 2.0 * np.pi * np.concatenate([m.position for m in channel.moves]) / line.period
+    waves = np.column_stack([np.sin(phase), np.cos(phase)])
+    odds = log_gain(np.concatenate(channel.left), channel.columns, waves, channel.floor) - np.log(line.tried)
+    found.unknown_chance = min(found.unknown_chance, float(-odds / np.log(10.0)))
 
 
 def _following_laws(rows: JointRows) -> dict[str, tuple[str, ...]]:
@@ -228,7 +237,7 @@ def _by_kind(texts: Mapping[str, Sequence[str]], columns: Floats) -> dict[str, F
 
 
 def _behind_causes(data: ChannelData, done: ChannelFit, columns: Sequence[Mapping[str, Floats]]) -> ChannelFit:
-    """The fit of a following error with what its written laws and causes leave. columns (n, q): of the laws by kind, per run."""
+    """The fit of a following error with the residual of its written laws and causes. columns (n, q): of the laws by kind, per run."""
     rest = [values - data.response(k, done.acting) for k, values in enumerate(data.values)]
     sizes, covariance = healthy_sizes([columns[k] for k in data.train], [rest[k] for k in data.train], data.floor)
     left = [own - sum(columns[k][kind] @ size for kind, size in sizes.items()) for k, own in enumerate(rest)]
@@ -236,15 +245,10 @@ def _behind_causes(data: ChannelData, done: ChannelFit, columns: Sequence[Mappin
 
 
 def _written_law(found: AxisFindings, texts: Mapping[str, Sequence[str]], sizes: Mapping[str, Floats]) -> LawPart:
-    """The entry of a machine file for what every axis has in its following error; it holds at any motion."""
+    """The entry of a machine file for healthy sizes of a following error; it holds at any motion."""
     amounts = [float(v) for kind in texts for v in sizes[kind]]
     formula = law_sum(list(zip(amounts, _all(texts), strict=True)))
     return LawPart(effect="formula", stage="control", target=found.name, axis=None, envelope={}, formula=formula)
-
-
-def _positions(rows: JointRows) -> Floats:
-    """Positions (n,) of the fitted runs."""
-    return np.concatenate([rows.moves[k].position for k in rows.train])
 
 
 def _step(moves: Sequence[AxisTravel]) -> float:
@@ -422,20 +426,19 @@ def _channel(rows: JointRows, done: ChannelFit, response: Response) -> AxisChann
     constant = done.sizes["offset"][0] if rows.channel == "force" else 0.0
     pushing = [each for each in done.acting if each[0].run is not None]
     pushed = [response(k, pushing) for k in range(len(values))]
-    moving = sum(float(np.ptp(moves[k].position)) > FAR * FIRST_MOVE_MM for k in train)
-    data = series([moves[k].time for k in train], [values[k] for k in train], moving)
-    first = by_block(data, data.y - constant)
-    channel = AxisChannel(data=data, runs=train, first=first, last=first, floor=rows.floor, stated=rows.stated)
+    first = block_squares([values[k] - constant for k in train])
+    channel = AxisChannel(
+        values=[values[k] for k in train], runs=train, first=first, last=block_squares([done.left[k] for k in train]),
+        floor=rows.floor, stated=rows.stated,
+    )  # fmt: skip
     channel.all_names = [run.name for run in rows.runs]
     channel.moves, channel.left = [moves[k] for k in train], [done.left[k] for k in train]
-    channel.last = by_block(data, np.concatenate(channel.left))
     channel.columns = done.columns
     channel.whole = [(moves[k].time, values[k]) for k in train]
     channel.held_whole = {k: values[k] - constant - pushed[k] for k in test}
     if test:
-        seen = series([moves[k].time for k in test], [values[k] for k in test])
-        channel.first = by_block(seen, np.concatenate([channel.held_whole[k] for k in test]))
-        channel.last = by_block(seen, np.concatenate([done.left[k] for k in test]))
+        channel.first = block_squares([channel.held_whole[k] for k in test])
+        channel.last = block_squares([done.left[k] for k in test])
     channel.held = {k: done.left[k] for k in test}
     channel.held_times = {k: moves[k].time for k in test}
     order = [*train, *test]
@@ -446,5 +449,5 @@ def _channel(rows: JointRows, done: ChannelFit, response: Response) -> AxisChann
         own = [not_known(values[k] - done.left[k] - constant) for k in order]
         known = [np.hypot(each, rising(pushed[k], moves[k].time, rise)) for k, each in zip(order, own, strict=True)]
         left = [each / np.hypot(1.0, by / rows.floor) for each, by in zip(left, known, strict=True)]
-    channel.gate = judge(left, left, [moves[k].time for k in order], rows.floor)
+    channel.gate = judge(left, [moves[k].time for k in order], rows.floor)
     return channel

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from camcomp.diagnosis.axis.block_least_squares import solve
 from camcomp.diagnosis.axis.findings import ROWS, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.terms import (
     SETTLED,
     WIDE,
     AxisTravel,
+    solve,
     travel,
 )
 from camcomp.ground.datatypes import Bools, Floats

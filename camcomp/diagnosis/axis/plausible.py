@@ -6,10 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.diagnosis.axis.block_least_squares import solve
 from camcomp.diagnosis.axis.findings import ROWS, AxisRun
 from camcomp.diagnosis.axis.noise_floor import rows_floor
-from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, travel
+from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, solve, travel
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 

@@ -10,7 +10,7 @@ import numpy as np
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Motion
 from camcomp.model.hysteresis import direction
@@ -31,18 +31,25 @@ def predict_encoders(robot: Robot, causes: Sequence[Cause], log: Measured, start
     if not servo:
         return np.zeros_like(log.setpoint)
     motion = between_rows(_motion(robot, log, _filled(log.time, log.setpoint, robot), started_s))
+    late = signal_path.controlled(servo, motion.names, motion) - motion.encoder
+    levers = np.array([lever_mm(a.revolute) for a in robot.actuators])
+    unsure = depends_on_start(servo, motion, _filled(log.time, log.encoder, robot)[:1], levers)
+    every = (len(motion.time) - 1) // max(len(log.time) - 1, 1) or 1
+    return np.where(np.isfinite(log.setpoint), np.where(unsure, np.nan, late)[::every], 0.0)
+
+
+def depends_on_start(servo: Sequence[Cause], motion: Motion, start: Floats, levers: Floats) -> Bools:
+    """Rows (n, m) whose predicted encoders depend on how the axes moved before the log began.
+
+    start (1, m): first encoders; levers (m,): way in mm per unit of a coordinate.
+    """
     late = signal_path.controlled(servo, motion.names, motion)
     others = [signal_path.controlled(servo, motion.names, replace(motion, seams=None)) - late]
     loops = [cause for cause in servo if "law" not in cause.values]
     if loops and len(motion.time) > 1:
-        begun = _begun(motion, _filled(log.time, log.encoder, robot)[:1])
         settled = signal_path.controlled(loops, motion.names, motion)
-        others.append(signal_path.controlled(loops, motion.names, begun)[1:] - settled)
-    known_mm = REPEATABILITY_MM / np.array([lever_mm(a.revolute) for a in robot.actuators])
-    unsure = np.any([np.abs(each) > known_mm for each in others], axis=0)
-    every = (len(motion.time) - 1) // max(len(log.time) - 1, 1) or 1
-    late, unsure = (late - motion.encoder)[::every], unsure[::every]
-    return np.where(np.isfinite(log.setpoint), np.where(unsure, np.nan, late), 0.0)
+        others.append(signal_path.controlled(loops, motion.names, _begun(motion, start))[1:] - settled)
+    return np.asarray(np.any([np.abs(each) > REPEATABILITY_MM / levers for each in others], axis=0))
 
 
 def _begun(motion: Motion, start: Floats) -> Motion:

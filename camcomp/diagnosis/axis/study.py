@@ -17,7 +17,6 @@ import numpy as np
 
 from camcomp.diagnosis.axis import answer
 from camcomp.diagnosis.axis.at_tip import TipMotion
-from camcomp.diagnosis.axis.block_least_squares import WHOLE_RUNS, solve
 from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisDeviation, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import AxisGate
 from camcomp.diagnosis.axis.joint import AxisSurroundings, JointRows, study_channel
@@ -25,8 +24,8 @@ from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
 from camcomp.diagnosis.axis.next_moves import next_moves
 from camcomp.diagnosis.axis.noise_floor import following_floor, rows_floor
-from camcomp.diagnosis.axis.own_unit import in_own_unit
-from camcomp.diagnosis.axis.terms import AxisTravel, travel
+from camcomp.diagnosis.axis.terms import AxisTravel, solve, travel
+from camcomp.diagnosis.law.folds import PARTS
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.diagnosis.result.floor_rule import within_floor
@@ -46,21 +45,6 @@ ASYMMETRY = frozenset(("asymmetry_Ns_per_mm", "asymmetry_Nmms_per_rad"))  # of f
 NO_TIPS = "ISO 230-2: the tip was not measured"
 
 
-def study(
-    axes: Mapping[str, Sequence[AxisRun]],
-    *,
-    holdout: Sequence[str] = (),
-    without: Sequence[str] = (),
-    stated: AxisDeviation | None = None,
-    robot: Robot | None = None,
-) -> DiagnosisResult:
-    """Result for logs of axes by name. holdout: runs that are judged and never fitted; robot: carries errors to the tip.
-
-    Raises ValueError where no run of any axis has enough rows.
-    """
-    return studied(axes, holdout=holdout, without=without, stated=stated, robot=robot)[0]
-
-
 def studied(
     axes: Mapping[str, Sequence[AxisRun]],
     *,
@@ -69,9 +53,13 @@ def studied(
     stated: AxisDeviation | None = None,
     robot: Robot | None = None,
 ) -> tuple[DiagnosisResult, list[AxisFindings]]:
-    """The result of `study`, with the findings of all axes."""
+    """Result for logs of axes by name, and the findings of all axes.
+
+    holdout: runs that are judged and never fitted; robot: carries errors to the tip. Raises ValueError where no run of any
+    axis has enough rows.
+    """
     names = sorted({r.name for runs in axes.values() for r in runs})
-    held = [n for n in names if n in holdout] if holdout else names if len(names) >= WHOLE_RUNS else []
+    held = [n for n in names if n in holdout] if holdout else names if len(names) >= PARTS else []
     again = 0 if len(held) == 1 and holdout else len(held)  # fits that leave out one run each
     clean = {name: [r.without_spikes() for r in runs] for name, runs in axes.items()}
     outliers = {(r.name, int(row)) for runs in clean.values() for r, rows in runs for row in rows}
@@ -99,9 +87,7 @@ def _result(
 ) -> DiagnosisResult:
     """The result of findings of all axes. judged: findings without each of the runs `held`. outliers: runs and rows."""
     whole = sum(len(a.channels) for a in found)  # every channel weighs alike
-    causes = [
-        in_own_unit(c.model_copy(update={"share": round(c.share / whole, 4)}), a) for a in found for c in a.causes
-    ]
+    causes = [c.model_copy(update={"share": round(c.share / whole, 4)}) for a in found for c in a.causes]
     causes.sort(key=lambda c: (-c.probability, -c.share))
     known = tuple(NamedCause(effect=c.effect, target=c.target) for c in causes)
     verdict = _verdict(found)
@@ -151,7 +137,7 @@ def _nothing_below_the_floor(axis: AxisFindings) -> None:
     following.gate = AxisGate("at", 0.0, ())
     if axis.laws:  # the machine file has none of them, and nothing of the gap is claimed
         axis.laws, following.held = [], following.held_whole
-        following.left = np.split(following.data.y, np.cumsum([len(each) for each in following.left])[:-1])
+        following.left = following.values
     if axis.force is None and axis.behind is None:
         axis.unknown_in, axis.law = [], None
 

@@ -17,6 +17,14 @@ SETTLED = 5.0  # time constants after which a late axis shows no more how it mov
 WIDE = (5, 10, 20, 40)  # samples on either side of a local cubic
 
 
+def solve(A: Floats, y: Floats) -> Floats:
+    """Least squares (k,) by scaled normal equations."""
+    size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
+    B = A / size
+    out: Floats = np.linalg.lstsq(B.T @ B, B.T @ y, rcond=1e-13)[0] / size
+    return out
+
+
 @dataclass(frozen=True, eq=False)
 class AxisTravel:
     """Encoder of one run as a local cubic: position mm, speed mm/s, acceleration mm/s2, each (n,); time (n,) s."""

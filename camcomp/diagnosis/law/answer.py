@@ -11,7 +11,7 @@ from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import TermBench, spots
 from camcomp.diagnosis.law.describe import law_result, moved_without
-from camcomp.diagnosis.law.find import FoundLaw, find_law
+from camcomp.diagnosis.law.find import BETTER, FoundLaw, find_law
 from camcomp.diagnosis.law.folds import Folds, Split, usual_split
 from camcomp.diagnosis.law.screen import term_grids
 from camcomp.diagnosis.law.smooth import find_map
@@ -22,8 +22,6 @@ from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, temperature_of, total
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats
-
-BETTER = 0.9  # of what the causes or a law leave on withheld parts: a law, or another one, has to leave less
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

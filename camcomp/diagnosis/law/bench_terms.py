@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -26,7 +27,7 @@ Rows = TipRows | DriveRows
 
 @dataclass(frozen=True)
 class Spot:
-    """Where a law acts: on control or drive of an actuator (its index), or on the tip along a program axis (0 to 2)."""
+    """Where a law acts: on control, drive or drive force of an actuator (its index), or on the tip along a program axis (0 to 2)."""
 
     on: str
     index: int
@@ -52,8 +53,75 @@ def spots(actuators: int, kind: str) -> list[Spot]:
     return [Spot("structure", a) for a in range(3)] + [Spot("drive", j) for j in range(actuators)]
 
 
-class TermBench:
+class TermRows(ABC):
+    """Evaluates terms on rows of runs, whatever channels show them."""
+
+    wide: float  # what a law may move these channels by, standard deviation before any data
+
+    @property
+    @abstractmethod
+    def actuators(self) -> Sequence[str]:
+        """Names in order."""
+
+    @abstractmethod
+    def unit(self, spot: Spot) -> str:
+        """Of what a law does at a spot."""
+
+    @property
+    @abstractmethod
+    def row_counts(self) -> Sequence[int]:
+        """Rows of every run."""
+
+    @abstractmethod
+    def rows(self, spot: Spot) -> Sequence[Mapping[str, Floats]]:
+        """Covariates per run where the spot is."""
+
+    @abstractmethod
+    def rms(self, spot: Spot, values: Sequence[Floats]) -> Floats:
+        """By how much each of functions (n, f) at a spot moves the channels (f,), per unit of its coefficient: over all rows."""
+
+    @abstractmethod
+    def white(self, spot: Spot, values: Sequence[Floats]) -> White:
+        """Functions (n, f) per run as white columns of the channels that the spot reaches."""
+
+    @abstractmethod
+    def white_rows(self, spot: Spot) -> int:
+        """How many white rows of all runs the spot reaches."""
+
+    @abstractmethod
+    def shown(self, spot: Spot) -> Sequence[Floats]:
+        """Instants per run, on the common clock, of rows that show what happens at a spot."""
+
+    def sizes(self, spot: Spot) -> Sizes:
+        """Reach of the covariates there."""
+        return sizes(self.rows(spot))
+
+    def values(self, spot: Spot, *forms: Form | SmoothForm) -> list[Floats]:
+        """Functions of forms (n, f), one behind the other, per run: mm or rad per unit of their coefficients; 0 where they are none."""
+        known = dict.fromkeys(self.rows(spot)[0])
+        functions = [_functions(form, known) for form in forms]
+        # rows of a function lie together, as they are worked out
+        each = (
+            np.concatenate([f(rows, n) for f in functions])
+            for rows, n in zip(self.rows(spot), self.row_counts, strict=True)
+        )
+        return [np.nan_to_num(values, copy=False).T for values in each]
+
+    def precision(self, spot: Spot, values: Sequence[Floats], count: int) -> Floats:
+        """Prior precision (f, count) of functions (n, f count) of which each `count` belong together."""
+        size = np.mean(self.rms(spot, values).reshape(-1, count) ** 2, axis=1) / self.wide**2
+        return np.repeat(size[:, None] + 1e-12, count, axis=1)
+
+    @cached_property
+    def at_once(self) -> int:
+        """Forms whose functions of all rows fit into AT_ONCE_BYTES."""
+        return max(int(AT_ONCE_BYTES / (16.0 * sum(self.row_counts))), 4)
+
+
+class TermBench(TermRows):
     """Evaluates terms on the runs of a bench; noise, inflate, times: of its rows, as a Problem has them."""
+
+    wide = WIDE_MM
 
     def __init__(self, bench: Bench, noise: Noise, inflate: Sequence[Floats], times: Sequence[Floats]) -> None:
         self.bench, self.noise, self.inflate, self.times = bench, noise, inflate, times
@@ -61,6 +129,21 @@ class TermBench:
         self._ways: dict[Spot, list[Floats]] = {}
         self._squares: dict[Spot, list[Floats]] = {}
         self._reaches: dict[tuple[Spot, int], tuple[list[int], Floats]] = {}
+
+    @property
+    def actuators(self) -> Sequence[str]:
+        """Names in order."""
+        return self.bench.actuators
+
+    def unit(self, spot: Spot) -> str:
+        """Of what a law does at a spot."""
+        hinge = spot.on in ("control", "drive") and self.bench.twin.robot.actuators[spot.index].revolute
+        return "rad" if hinge else "mm"
+
+    @property
+    def row_counts(self) -> Sequence[int]:
+        """Rows of every run."""
+        return [len(run.run_path.time) for run in self.bench.runs]
 
     def rows(self, spot: Spot) -> Sequence[Rows]:
         """Covariates per run where the spot is."""
@@ -73,18 +156,6 @@ class TermBench:
                 else list(_drive_rows(bench, spot.index, setpoints=spot.on == "control"))
             )
         return self._rows[key]
-
-    def sizes(self, spot: Spot) -> Sizes:
-        """Reach of the covariates there."""
-        return sizes(self.rows(spot))
-
-    def values(self, spot: Spot, *forms: Form | SmoothForm) -> list[Floats]:
-        """Functions of forms (n, f), one behind the other, per run: mm or rad per unit of their coefficients; 0 where they are none."""
-        known = dict.fromkeys(self.rows(spot)[0])
-        functions = [_functions(form, known) for form in forms]
-        # rows of a function lie together, as they are worked out
-        each = (np.concatenate([f(rows) for f in functions]) for rows in self.rows(spot))
-        return [np.nan_to_num(values, copy=False).T for values in each]
 
     def tip_ways(self, spot: Spot) -> list[Floats]:
         """By how much the tip (n, 3), program frame, moves per unit at the spot, per run."""
@@ -99,11 +170,6 @@ class TermBench:
         ways = self._squares[spot]
         energy = np.sum([way @ v**2 for way, v in zip(ways, values, strict=True)], axis=0)
         return np.asarray(np.sqrt(energy / sum(len(v) for v in values)))
-
-    def precision(self, spot: Spot, values: Sequence[Floats], count: int) -> Floats:
-        """Prior precision (f, count) of functions (n, f count) of which each `count` belong together: WIDE_MM at the tip."""
-        size = np.mean(self.rms(spot, values).reshape(-1, count) ** 2, axis=1) / WIDE_MM**2
-        return np.repeat(size[:, None] + 1e-12, count, axis=1)
 
     def _tip_ways(self, spot: Spot) -> list[Floats]:
         bench = self.bench
@@ -160,17 +226,17 @@ class TermBench:
         """How many white rows of all runs the spot reaches."""
         return sum(len(own.get(c, ())) for k, own in enumerate(self._slices) for c in self._reach(spot, k)[0])
 
-    @cached_property
-    def at_once(self) -> int:
-        """Forms whose functions of all rows fit into AT_ONCE_BYTES."""
-        return max(int(AT_ONCE_BYTES / (16.0 * sum(len(run.run_path.time) for run in self.bench.runs))), 4)
-
     def seen(self, spot: Spot) -> list[Bools]:
         """Rows (n',) per run, thinned, in which some channel that the spot reaches is known."""
         return [
             np.asarray(np.isfinite(inflate[:, self._reach(spot, k)[0]]).any(axis=1))
             for k, inflate in enumerate(self.inflate)
         ]
+
+    def shown(self, spot: Spot) -> list[Floats]:
+        """Instants per run, on the common clock, of rows that show what happens at a spot."""
+        every = zip(self.bench.runs, self.times, self.seen(spot), strict=True)
+        return [run.run_path.started + t[seen] for run, t, seen in every]
 
     def channels(self, spot: Spot, values: Sequence[Floats]) -> list[Floats]:
         """Functions (n, f) per run as changes of all channels, thinned: (n', c, f)."""
@@ -200,13 +266,13 @@ class TermBench:
         return White(tuple(rows), tuple(columns))
 
 
-def _functions(form: Form | SmoothForm, known: Mapping[str, object]) -> Callable[[Rows], Floats]:
-    """Functions (f, n) of a form, as a function of rows with known covariates."""
+def _functions(form: Form | SmoothForm, known: Mapping[str, object]) -> Callable[[Mapping[str, Floats], int], Floats]:
+    """Functions (f, n) of a form, as a function of n rows with known covariates."""
     if isinstance(form, SmoothForm):
         along = list(zip(form.about, form.limits, form.counts, strict=True))
-        return lambda rows: tensor([splines(rows[name], *limits, count) for name, limits, count in along]).T
+        return lambda rows, _: tensor([splines(rows[name], *limits, count) for name, limits, count in along]).T
     parsed = [parse(text, known) for text in form.said]
-    return lambda rows: np.array([each(rows, rows.rows) for each in parsed])
+    return lambda rows, n: np.array([each(rows, n) for each in parsed])
 
 
 def _load_names(robot: Robot, j: int) -> tuple[str, ...]:

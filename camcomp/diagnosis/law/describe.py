@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from camcomp.diagnosis.law.bench_terms import Spot, TermBench
+from camcomp.diagnosis.law.bench_terms import Spot, TermBench, TermRows
 from camcomp.diagnosis.law.find import FoundLaw, strengths
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.words import law_sentence, law_sum, listed
@@ -18,11 +18,12 @@ from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.law.expression import parse
 
 _AXES = "xyz"
+OF_ACTUATORS = ("control", "drive", "force")  # places of a law
 
 
-def law_result(bench: TermBench, found: FoundLaw, before_um: float, after_um: float) -> Law:
+def law_result(bench: TermRows, found: FoundLaw, before_um: float, after_um: float) -> Law:
     """The law as it stands in the result; before, after: rms of the gap on runs that it was not fitted to."""
-    actuators = bench.bench.actuators
+    actuators = bench.actuators
     parts, terms = (_map_parts if found.is_map else _formula_parts)(bench, found, actuators)
     forms = [t.form for t in found.terms]
     alike = dict.fromkeys(f"{_where(o.spot, actuators)}: {_said(o.form)}" for each in found.alike for o in each)
@@ -33,16 +34,16 @@ def law_result(bench: TermBench, found: FoundLaw, before_um: float, after_um: fl
         says = law_sentence([each for each in forms if isinstance(each, Form)])
     if alike:
         says += f" These data cannot tell it from {listed(list(alike)[:3])}."
-    formula = "; ".join(f"{where_of(each)} = {_equation(each)}" for each in parts)
-    envelope = {name: limits for each in parts for name, limits in each.envelope.items()}
+    formula = "; ".join(f"{_where(spot, actuators)} = {_equation(each)}" for spot, each in parts)
+    envelope = {name: limits for _, each in parts for name, limits in each.envelope.items()}
     return Law(
         formula=formula, on=_stage(bench, found), terms=tuple(terms), envelope=envelope, after_rms_um=round(after_um, 3),
         kind="map" if found.is_map else "formula", before_rms_um=round(before_um, 3), says=says, alike=tuple(alike),
-        parts=tuple(parts),
+        parts=tuple(each for spot, each in parts if spot.on != "force"),  # no machine file has forces
     )  # fmt: skip
 
 
-def _stage(bench: TermBench, found: FoundLaw) -> Stage:
+def _stage(bench: TermRows, found: FoundLaw) -> Stage:
     """The stage of the spot whose terms move the tip most; one step of several axes at once is the workpiece's."""
     energy: dict[Spot, float] = {}
     for term, size in zip(found.terms, strengths(bench, found), strict=True):
@@ -51,10 +52,12 @@ def _stage(bench: TermBench, found: FoundLaw) -> Stage:
     steps = {t.spot.index for t in found.terms if t.form.family == "step"}
     if on == "structure" and len(steps) > 1:
         return "workpiece"
-    return "control" if on == "control" else "drive" if on == "drive" else "structure"
+    return "control" if on == "control" else "drive" if on in OF_ACTUATORS else "structure"
 
 
-def _formula_parts(bench: TermBench, found: FoundLaw, actuators: Sequence[str]) -> tuple[list[LawPart], list[LawTerm]]:
+def _formula_parts(
+    bench: TermRows, found: FoundLaw, actuators: Sequence[str]
+) -> tuple[list[tuple[Spot, LawPart]], list[LawTerm]]:
     pairs: dict[Spot, list[tuple[float, str]]] = {}
     terms = []
     each = zip(found.by_term(found.theta), found.by_term(np.sqrt(np.diag(found.covariance))), found.terms, strict=True)
@@ -72,25 +75,25 @@ def _formula_parts(bench: TermBench, found: FoundLaw, actuators: Sequence[str]) 
     for spot, own in pairs.items():
         formula = law_sum(own)
         names = parse(formula, dict.fromkeys(bench.rows(spot)[0])).names
-        parts.append(
-            LawPart(effect="formula", formula=formula, envelope=_envelope(bench, spot, names), **_at(spot, actuators))
-        )
+        own_envelope = _envelope(bench, spot, names)
+        parts.append((spot, LawPart(effect="formula", formula=formula, envelope=own_envelope, **_at(spot, actuators))))
     return parts, terms
 
 
-def _map_parts(bench: TermBench, found: FoundLaw, actuators: Sequence[str]) -> tuple[list[LawPart], list[LawTerm]]:
+def _map_parts(
+    bench: TermRows, found: FoundLaw, actuators: Sequence[str]
+) -> tuple[list[tuple[Spot, LawPart]], list[LawTerm]]:
     parts, terms = [], []
     for term, theta in zip(found.terms, found.by_term(found.theta), strict=True):
         assert isinstance(term.form, SmoothForm)
         coefficients = np.round(theta.reshape(term.form.counts), 7).tolist()
         limits = zip(term.form.about, term.form.limits, strict=True)
         envelope = {name: (six_digits(low), six_digits(high)) for name, (low, high) in limits}
-        parts.append(
-            LawPart(
-                effect="map", over=term.form.about, coefficients_mm=coefficients, envelope=envelope,
-                **_at(term.spot, actuators),
-            )
+        part = LawPart(
+            effect="map", over=term.form.about, coefficients_mm=coefficients, envelope=envelope,
+            **_at(term.spot, actuators),
         )  # fmt: skip
+        parts.append((term.spot, part))
         low, high = six_digits(theta.min()), six_digits(theta.max())
         terms.append(
             LawTerm(
@@ -102,12 +105,12 @@ def _map_parts(bench: TermBench, found: FoundLaw, actuators: Sequence[str]) -> t
 
 
 def _at(spot: Spot, actuators: Sequence[str]) -> dict[str, str | None]:
-    if spot.on in ("control", "drive"):
-        return {"stage": spot.on, "target": actuators[spot.index], "axis": None}
+    if spot.on in OF_ACTUATORS:
+        return {"stage": "control" if spot.on == "control" else "drive", "target": actuators[spot.index], "axis": None}
     return {"stage": spot.on, "target": None, "axis": _AXES[spot.index]}
 
 
-def _envelope(bench: TermBench, spot: Spot, names: Iterable[str]) -> dict[str, tuple[float, float]]:
+def _envelope(bench: TermRows, spot: Spot, names: Iterable[str]) -> dict[str, tuple[float, float]]:
     size = bench.sizes(spot)
     out = {}
     for name in names:
@@ -127,7 +130,7 @@ def _said(form: Form | SmoothForm) -> str:
 
 
 def _where(spot: Spot, actuators: Sequence[str]) -> str:
-    if spot.on in ("control", "drive"):
+    if spot.on in OF_ACTUATORS:
         return f"{spot.on} {actuators[spot.index]}"
     return f"tip {_AXES[spot.index]}"
 
@@ -141,10 +144,8 @@ def _equation(part: LawPart) -> str:
     return part.formula or f"map over {listed(part.over or ())}"
 
 
-def _unit(bench: TermBench, spot: Spot, per: str) -> str:
-    hinge = spot.on in ("control", "drive") and bench.bench.twin.robot.actuators[spot.index].revolute
-    own = "rad" if hinge else "mm"
-    return f"{own}/{per}" if per else own
+def _unit(bench: TermRows, spot: Spot, per: str) -> str:
+    return f"{bench.unit(spot)}/{per}" if per else bench.unit(spot)
 
 
 def moved_without(bench: TermBench, found: FoundLaw) -> list[Floats]:

@@ -13,7 +13,7 @@ from itertools import combinations
 
 import numpy as np
 
-from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench
+from camcomp.diagnosis.law.bench_terms import Spot, Term, TermRows
 from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, White, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.screen import Screen, TermGrid
@@ -23,6 +23,7 @@ from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
 MOST_TERMS = 6
+BETTER = 0.9  # of what the causes or a law leave on withheld parts: a law, or another one, has to leave less
 REFINED = 7  # kinds of terms whose shapes are followed at every step
 CONSTANT = Form(family="constant", about=(), texts=("1",), units=("",))
 _PLAIN = ("line", "power", "product", "rate", "force")  # simpler kinds of the same value come first
@@ -76,7 +77,7 @@ def fitted(shapes: Shapes, terms: Sequence[Term], folds: Folds) -> FoundLaw:
 
 
 def find_law(
-    bench: TermBench, base: Callable[[Split, bool], Folds], grids: Sequence[TermGrid], floor_mm: float
+    bench: TermRows, base: Callable[[Split, bool], Folds], grids: Sequence[TermGrid], floor_mm: float
 ) -> FoundLaw | None:
     """The law with terms of the grids that the residual follows; None where all fail on withheld parts.
 
@@ -87,9 +88,9 @@ def find_law(
 
 class _Search:
     def __init__(
-        self, bench: TermBench, base: Callable[[Split, bool], Folds], grids: Sequence[TermGrid], floor_mm: float
+        self, bench: TermRows, base: Callable[[Split, bool], Folds], grids: Sequence[TermGrid], floor_mm: float
     ) -> None:
-        self.base, self.split = base, usual_split(len(bench.bench.runs))
+        self.base, self.split = base, usual_split(len(bench.row_counts))
         self.folds = base(self.split, True)
         self.bench, self.grids, self.floor_mm = bench, grids, floor_mm
         self.screen = Screen(grids, self.folds)
@@ -224,7 +225,7 @@ class _Search:
         return replace(fitted(self.shapes, chosen, self.folds), alike=tuple(alike))
 
 
-def strengths(bench: TermBench, found: FoundLaw) -> Iterator[float]:
+def strengths(bench: TermRows, found: FoundLaw) -> Iterator[float]:
     """Mean square of what each term does to the tip, mm2."""
     for term, theta in zip(found.terms, found.by_term(found.theta), strict=True):
         values = [v @ theta[:, None] for v in bench.values(term.spot, term.form)]

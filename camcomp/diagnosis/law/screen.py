@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, spots
+from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, TermRows, spots
 from camcomp.diagnosis.law.folds import Folds, Products, White, gains
 from camcomp.diagnosis.law.forms import Form, at_drive, at_tip
 from camcomp.ground.datatypes import Floats
@@ -21,7 +21,7 @@ class TermGrid:
     keep: whether there is room for their white columns.
     """
 
-    bench: TermBench
+    bench: TermRows
     spots: tuple[Spot, ...]
     forms: tuple[Form, ...]
     at_once: int
@@ -52,7 +52,12 @@ def term_grids(bench: TermBench, kind: str) -> list[TermGrid]:
     every = spots(len(bench.bench.actuators), kind)
     tip = tuple(each for each in every if each.on == "structure")
     groups = [each for each in (tip, *((each,) for each in every if each not in tip)) if each]
-    pairs = [(where, some) for where in groups for some in _by_count(_forms(bench, where[0]))]
+    return grids_of(bench, [(where, _forms(bench, where[0])) for where in groups])
+
+
+def grids_of(bench: TermRows, tried: Sequence[tuple[tuple[Spot, ...], Sequence[Form]]]) -> list[TermGrid]:
+    """Grids of forms that are tried at spots with the same covariates."""
+    pairs = [(where, some) for where, forms in tried for some in _by_count(forms)]
     size = sum(8.0 * sum(map(bench.white_rows, where)) * len(some) * some[0].size for where, some in pairs)
     return [
         TermGrid(bench=bench, spots=where, forms=some, at_once=bench.at_once, keep=size < KEPT_BYTES)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize
 
-from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench
+from camcomp.diagnosis.law.bench_terms import Spot, Term, TermRows
 from camcomp.diagnosis.law.folds import Folds, White, gains
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.ground.datatypes import Floats
@@ -20,7 +20,7 @@ MOST_APART = 500  # such steps to both sides: runs that are days apart do not co
 class Shapes:
     """Columns of the terms of a bench, and terms whose shapes follow the data."""
 
-    def __init__(self, bench: TermBench) -> None:
+    def __init__(self, bench: TermRows) -> None:
         self.bench = bench
         self._seen: dict[Term, tuple[White, Floats]] = {}
 
@@ -93,9 +93,7 @@ class Shapes:
 
     def _between(self, spot: Spot) -> Floats:
         """Instants on the common clock in the middle between rows that show what happens at a spot."""
-        every = zip(self.bench.bench.runs, self.bench.times, self.bench.seen(spot), strict=True)
-        shown = [run.run_path.started + t[seen] for run, t, seen in every]
-        return np.sort(np.concatenate([0.5 * (t[1:] + t[:-1]) for t in shown]))
+        return np.sort(np.concatenate([0.5 * (t[1:] + t[:-1]) for t in self.bench.shown(spot)]))
 
     def _gains(self, step: Folds, spot: Spot, forms: Sequence[Form]) -> Floats:
         """Log evidence (f,) that forms of as many functions each add, each alone."""

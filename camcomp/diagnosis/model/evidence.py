@@ -64,7 +64,7 @@ class LinearModel:
 
     fitted: indices of the groups that are fitted, None for all; the others are judged only. families: effect -> its columns
     at all targets. healthy: covariates that are always there, with the scale that healthy machines and instruments have,
-    in floors.
+    in floors. floors: noise of the groups in floors, more than 1 where their rows count for less.
     """
 
     groups: tuple[Group, ...]
@@ -73,12 +73,13 @@ class LinearModel:
     fitted: tuple[int, ...] | None = None
     families: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     healthy: Mapping[str, float] = field(default_factory=dict)
+    floors: float = 1.0
 
     def __post_init__(self) -> None:
         self.layout = ColumnLayout.of(self.groups)
         self._grams: dict[SmoothProcess | None, tuple[NormalEquations, ...]] = {}
         self._totals: dict[tuple[SmoothProcess | None, tuple[int, ...]], NormalEquations] = {}
-        self._reduced: dict[tuple[Background, tuple[int, ...]], Reduced] = {}
+        self._reduced: dict[Background, Reduced] = {}
         self.candidates = tuple(self._seen(each) for each in self.candidates)
 
     def with_columns(self, kept: np.ndarray) -> LinearModel:
@@ -112,7 +113,7 @@ class LinearModel:
         whole = np.diag(A)[:k]
         free = whole - np.einsum("ij,ik,kj->j", scale[:, None] * X, inverse, scale[:, None] * X, optimize=True)
         seen = free > LEAST_VISIBLE * np.maximum(whole, LEAST_VISIBLE * self.rows)
-        return np.where(seen, np.sqrt(np.where(seen, free, 1.0) / self.rows * self.channels), 0.0)
+        return np.where(seen, self.floors * np.sqrt(np.where(seen, free, 1.0) / self.rows * self.channels), 0.0)
 
     @property
     def rows(self) -> int:
@@ -202,18 +203,17 @@ class LinearModel:
         data = [normal_equations(self.groups[g], self.layout, background.process, on) for g in self.own]
         return AmplitudePosterior.of(sum_grams(data), precision[on], np.arange(len(on)), background.noise).log_evidence
 
-    def reduced(self, background: Background, groups: Sequence[int] | None = None) -> Reduced:
+    def reduced(self, background: Background) -> Reduced:
         """Normal equations of the effects with all else integrated out."""
-        key = background, tuple(self.own if groups is None else groups)
-        if key not in self._reduced:
-            at = self.posterior(background, None, groups)
+        if background not in self._reduced:
+            at = self.posterior(background)
             k = self.layout.effects
             effects = np.flatnonzero(self.size > 0.0)
             own, by = at.without(effects)
             gram, moment = np.zeros((k, k)), np.zeros(k)
             gram[np.ix_(effects, effects)], moment[effects] = own, by
-            self._reduced[key] = Reduced(self, gram, moment, at.log_evidence)
-        return self._reduced[key]
+            self._reduced[background] = Reduced(self, gram, moment, at.log_evidence)
+        return self._reduced[background]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

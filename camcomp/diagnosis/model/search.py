@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from camcomp.diagnosis.model.candidates import Place, PlacedCause
+from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.evidence import LONG, Members
 from camcomp.ground.datatypes import Floats
 
@@ -47,13 +47,13 @@ class WeighedSets(Protocol):
         """Log posterior (m,) of a set with one of `more` each."""
 
 
-def search_sets(data: WeighedSets, most: int = MOST, among: Collection[Place] | None = None) -> Visited:
-    """Sets of up to `most` causes at some places, or all, with their log posteriors.
+def search_sets(data: WeighedSets, most: int = MOST) -> Visited:
+    """Sets of up to `most` causes with their log posteriors.
 
     A set has at most one candidate of more than LONG columns, which is tried with the best set of each size.
     """
     candidates = data.candidates
-    usable = [i for i in data.usable if among is None or candidates[i].place in among]
+    usable = data.usable
     long = {i for i in usable if len(candidates[i].columns) > LONG}
     values: dict[Members, float] = {(): data.value(())}
 

@@ -6,7 +6,7 @@ import pytest
 from camcomp.diagnosis.axis.disturbance_window import find_window
 from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
 from camcomp.diagnosis.axis.gate import intervals
-from camcomp.diagnosis.axis.study import study
+from tests.studies import axis_study as study
 
 FORCE, NOISE = 60.0, 0.5
 RAMP = 20  # rows of 1 ms, over which a push comes and goes: its middle is when it begins

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.axis.findings import AxisDeviation
-from camcomp.diagnosis.axis.study import study
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import DiagnosisResult
 from tests.contradictions import contradictions
 from tests.report.diagnoses import result
+from tests.studies import axis_study as study
 from tests.unit.diagnosis.test_studies import axis_log
 
 FLOOR = {"noise_floor_um": 0.87}

@@ -10,11 +10,11 @@ from ruamel.yaml import YAML
 from camcomp.diagnosis.arm.curves import covered, seen_angles
 from camcomp.diagnosis.arm.noise_floor import StatedDeviation
 from camcomp.diagnosis.arm.poses import Poses, approached
-from camcomp.diagnosis.arm.study import study as arm_study
 from camcomp.diagnosis.result.types import CurveCause
 from camcomp.model.config.load import load_config
 from camcomp.model.config.write_back import with_causes
 from camcomp.model.statics.build import build_robot
+from tests.studies import arm_study
 from tests.validation.plants.arm_poses import measured
 
 STATED = StatedDeviation(tip=0.02)

@@ -8,10 +8,10 @@ import pytest
 
 from camcomp.diagnosis.axis.findings import AxisDeviation
 from camcomp.diagnosis.axis.next_moves import set_points
-from camcomp.diagnosis.axis.study import study
 from camcomp.diagnosis.result.types import AxisMoves, StrokeBlock
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
+from tests.studies import axis_study as study
 from tests.unit.diagnosis.test_studies import axis_log
 
 

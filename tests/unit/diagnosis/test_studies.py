@@ -10,15 +10,14 @@ from camcomp.diagnosis.arm.noise_floor import StatedDeviation
 from camcomp.diagnosis.arm.plausible import check_poses
 from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.arm.registration import register
-from camcomp.diagnosis.arm.study import study as arm_study
 from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
 from camcomp.diagnosis.axis.noise_floor import rows_floor
 from camcomp.diagnosis.axis.plausible import check_axes
-from camcomp.diagnosis.axis.study import study as axis_study
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
 from camcomp.model.statics.hanging import hang
+from tests.studies import arm_study, axis_study
 from tests.validation.plants.arm_poses import measured
 
 

@@ -13,15 +13,14 @@ import pytest
 import camcomp
 from camcomp.api.recordings import import_recordings
 from camcomp.diagnosis.arm.poses import Poses
-from camcomp.diagnosis.arm.study import study as arm_study
 from camcomp.diagnosis.axis.findings import AxisRun
-from camcomp.diagnosis.axis.study import study as axis_study
 from camcomp.ground import progress as reported
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
 from camcomp.terminal import progress
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
+from tests.studies import arm_study, axis_study
 from tests.validation.plants.arm_poses import measured
 
 WORDS = ["compensate", str(ROOT / "samples/groove-circle-2.nc"), "--config", str(ROOT / "config/cartesian.yaml")]

@@ -45,6 +45,8 @@ class Runs(TermBench):
         self.runs = [Rows(x_mm=20.0 * np.sin(t)), Rows(x_mm=25.0 - 30.0 * np.cos(1.3 * t))]
         self.runs[0]["x_mm"][0] = 0.0
 
+    row_counts = property(lambda self: [Rows.rows] * len(self.runs))
+
     def rows(self, spot):
         return self.runs
 

@@ -5,7 +5,7 @@ from math import log10
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.axis.block_least_squares import Gain, gain, log10_chance
+from camcomp.diagnosis.axis.row_noise import log_gain
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 
 
@@ -26,11 +26,12 @@ def test_nothing_is_stated_as_certain():
     assert stated(1.0) == 0.9999 and stated(0.999949) == 0.9999 and stated(0.60416) == 0.6042 and stated(0.0) == 0.0
 
 
-def test_blocks_that_gain_by_chance_have_the_chance_that_they_say():
+def test_columns_that_are_not_there_gain_as_rarely_as_their_odds_say():
+    """The chance of a Bayes factor above K is at most 1/K where the columns do nothing (Markov)."""
     rng = np.random.default_rng(5)
-    chances = [10.0 ** log10_chance(gain(*np.exp(rng.standard_normal((2, 12))))) for _ in range(2000)]
-    assert np.mean(np.array(chances) < 0.05) == pytest.approx(0.05, abs=0.015)
-    assert log10_chance(Gain(0.1, 9.0, 1)) == 0.0 and log10_chance(Gain(0.1, 5.0, 25)) > log10_chance(
-        Gain(0.1, 6.0, 25)
-    )
-    assert log10_chance(Gain(0.1, 5.0, 25), 10) == pytest.approx(log10_chance(Gain(0.1, 5.0, 25)) + 1.0)
+    time = np.linspace(0.0, 1.0, 300)
+    beside, waves = np.stack([np.ones(300), time], axis=1), np.stack([np.sin(40.0 * time), np.cos(40.0 * time)], axis=1)
+    noise = rng.standard_normal((300, 300))
+    noise -= noise @ beside @ np.linalg.pinv(beside)
+    assert np.mean([log_gain(each, beside, waves, 1.0) > np.log(20.0) for each in noise]) < 0.05
+    assert log_gain(noise[0] + 1.5 * waves[:, 0], beside, waves, 1.0) > np.log(1e6)

@@ -1,0 +1,33 @@
+"""Noise of rows with a memory: how many of them count as one, and the evidence for further columns."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camcomp.diagnosis.model.discrepancy import gains_at_scales
+from camcomp.ground.datatypes import Floats
+
+
+def log_gain(left: Floats, columns: Floats, more: Floats, floor: float) -> float:
+    """Log Bayes factor of further columns (n, q) for residuals (n,) to which columns (n, k) were fitted."""
+    A = columns / (np.sqrt(np.mean(columns**2, axis=0)) + 1e-300)
+    X = more - A @ np.linalg.lstsq(A, more, rcond=1e-9)[0]
+    X = X / (np.sqrt(np.mean(X**2, axis=0)) + 1e-300)
+    sd = noise_of(left - X @ np.linalg.lstsq(X, left, rcond=1e-9)[0], floor)
+    return float(gains_at_scales(X.T @ X, X.T @ left / sd)[0].max())
+
+
+def noise_of(left: Floats, floor: float) -> float:
+    """Standard deviation of a row of residuals (n,) that counts as one of its own."""
+    return max(float(np.sqrt(np.mean(left**2) * rows_together(left))), floor)
+
+
+def rows_together(left: Floats) -> float:
+    """Rows that count as one: the integral of the autocorrelation of residuals (n,) up to its first zero, both ways."""
+    centred = left - left.mean()
+    n = len(centred)
+    power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
+    rho = np.fft.irfft(power)[:n]
+    rho = rho / max(float(rho[0]), 1e-300)
+    ends = np.flatnonzero(rho <= 0.0)
+    return float(1.0 + 2.0 * rho[1 : ends[0] if len(ends) else n].sum())
