@@ -78,14 +78,13 @@ class Flow:
 
     def _end_of_tape(self) -> int:
         """Number of valid rows: if the first line is a `%`, those before the next one."""
-        begun = False
         for row in range(len(self.text)):
             stripped = self.text.line(row).strip(BLANK)
             if stripped.startswith("%"):
-                if begun:
-                    return row
-                begun = True
-            elif stripped and not begun and code_of(stripped).strip(BLANK):
+                signs = (other for other in self.text.rows_with("%") if other > row)
+                ends = (other for other in signs if self.text.line(other).strip(BLANK).startswith("%"))
+                return next(ends, len(self.text))
+            if stripped and code_of(stripped).strip(BLANK):
                 break
         return len(self.text)
 

@@ -51,12 +51,9 @@ class OWords(Subprograms):
 
     def _scan(self) -> None:
         opened: dict[str, list[int]] = {}
-        for row in range(self.rows):
-            line = self.text.line(row)
-            if "o" not in line and "O" not in line:
-                continue
-            found = _STATEMENT.match(code_of(line))
-            if found is None:
+        for row in self.text.rows_with("[oO]"):
+            found = _STATEMENT.match(code_of(self.text.line(row)))
+            if row >= self.rows or found is None:
                 continue
             label = "".join(found[2].split()).lower()
             label = label.lstrip("0") or "0" if label.isdigit() else label

@@ -100,6 +100,11 @@ class Text:
         """Characters of line `index` (from 0), without its end of line."""
         return self.string[self.starts[index] : self.ends[index]]
 
+    def rows_with(self, pattern: str) -> list[int]:
+        """Lines in which a regular expression matches, ascending."""
+        at = [found.start() for found in re.finditer(pattern, self.string)]
+        return sorted({*(np.searchsorted(self.starts, at, side="right") - 1).tolist()})
+
     def end_of_line(self, index: int) -> str:
         """End of line `index`; for an unterminated last line that of the line before, or LF."""
         for each in (index, index - 1):

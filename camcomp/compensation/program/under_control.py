@@ -139,7 +139,7 @@ def rests(program: Program, rows: CorrectedRows, tolerance_um: float, part: Part
     """
     modes = program.modes
     free = np.array([rounds(mode, tolerance_um) for mode in modes], bool)
-    free[1:] &= np.array([a == b for a, b in pairwise(modes)], bool)
+    free[1:] &= np.array([a is b or a == b for a, b in pairwise(modes)], bool)
     cut = (rows.kind != RAPID) & ~rows.joining & rows.corrected
     out: Bools = rests_of(cut, rows.joining) & free[rows.motion]
     if part is not None:
@@ -224,7 +224,7 @@ def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um
 
 def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:
     """Every mode once, in the order in which they come."""
-    return tuple(dict.fromkeys(modes))
+    return tuple(dict.fromkeys({id(each): each for each in modes}.values()))
 
 
 def programmed_moves(program: Program, job: Job) -> ToolMoves:

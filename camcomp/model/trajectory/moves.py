@@ -108,9 +108,8 @@ def line_moves(
 
 def mode_columns(modes: Sequence[PathMode]) -> tuple[Bools, Bools, Floats, Floats]:
     """Columns exact, stop, tolerance (mm) and merge (mm) (n,) of ToolMoves for path modes (n,)."""
-    known = list(dict.fromkeys(modes))
-    at = {each: i for i, each in enumerate(known)}
-    which = np.fromiter((at[each] for each in modes), np.int64, len(modes))
-    table = [(each.exact, each.code == 611, each.tolerance_mm, each.merge_mm) for each in known]
+    known = {id(each): each for each in modes}  # few objects; to compare all of them takes longer
+    _, which = np.unique(np.fromiter(map(id, modes), np.int64, len(modes)), return_inverse=True)
+    table = [(each.exact, each.code == 611, each.tolerance_mm, each.merge_mm) for _, each in sorted(known.items())]
     columns = np.array(table, float).reshape(-1, 4)[which]
     return columns[:, 0] > 0.0, columns[:, 1] > 0.0, columns[:, 2].copy(), columns[:, 3].copy()
