@@ -28,9 +28,7 @@ from camcomp.diagnosis.statistics.ranking import Ranking, rank
 from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.ground.datatypes import Floats
 
-GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
 LEFT_OPEN = 0.25  # of what causes explain together: no set explains what leaves more, however large its members are
-INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +177,7 @@ def _credible(
             credible = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
             replaced = credible.replaced
             most = max(replaced, key=lambda i: replaced[i], default=None)
-            if most is None or replaced[most] < (EVEN if unknown else INSTEAD):
+            if most is None or replaced[most] < EVEN:
                 return f, dict(credible.present), instead
             instead = instead or problem.moved_um(f, (most,)) > _least(problem, _modelled(problem, f))
             kept = tuple(i for i in f.members if i != most)
@@ -193,8 +191,7 @@ def above_floor(problem: Problem, beyond: Mapping[str, Unexplained], modelled_um
     Where the tip is measured it says itself what moves it; only of the control it knows nothing.
     """
     counts = [beyond[kind] for kind in (("tip", "encoder") if "tip" in beyond else beyond) if kind in beyond]
-    least, for_a_while = _least(problem, modelled_um), max(GATE_LOCAL * problem.floor.tip_um, 2.0 * modelled_um)
-    return [each for each in counts if each.z > SURE_Z and (each.excess_um > least or each.local_um > for_a_while)]
+    return [each for each in counts if each.z > SURE_Z and each.excess_um > _least(problem, modelled_um)]
 
 
 def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> str | None:

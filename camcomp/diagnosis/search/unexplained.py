@@ -28,18 +28,13 @@ KINDS = ("tip", "encoder", "drive", "dyno")
 SURE_Z = 5.0  # standard deviations of chance
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True)
 class Unexplained:
-    """One kind of channel. excess_um: rms at the tip beyond the floor; z: in standard deviations of its chance; local_um:
-    the largest over a stretch of blocks; where: (run, t0 s, t1 s) of it; energy (m or 3,): by actuator or axis.
-    """
+    """One kind of channel. excess_um: rms at the tip beyond the floor; z: in standard deviations of its chance."""
 
     kind: str
     excess_um: float
     z: float
-    local_um: float
-    where: tuple[int, float, float]
-    energy: Floats
 
     @property
     def log10_chance(self) -> float:
@@ -120,7 +115,6 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
     excess: list[Floats] = []
     chance: list[Floats] = []
     weight: list[Floats] = []
-    place: list[tuple[int, float, float]] = []
     for k, values in enumerate(at_tip):
         t = problem.times[k]
         inflate = _inflation(problem, k, kind, values)
@@ -143,18 +137,13 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
             excess.append(np.where(enough, middle**2 - allowed, 0.0))
             chance.append(np.where(enough, allowed, 0.0))
             weight.append(np.where(enough, (usual + TINY) ** 2 / (allowed + TINY) ** 2, 0.0))
-            place.append((k, float(t[a]), float(t[min(a + BLOCK, len(t)) - 1])))
     e, v, w = np.array(excess), np.array(chance), np.array(weight)
     if not len(e):
-        return Unexplained(kind=kind, excess_um=0.0, z=0.0, local_um=0.0, where=(0, 0.0, 0.0), energy=np.zeros(3))
+        return Unexplained(kind, 0.0, 0.0)
     whole = np.maximum(w.sum(axis=0), 1.0)
     mean = float((np.sum(w * e, axis=0) / whole).sum())
     doubt = float(np.sqrt(2.0 * np.sum(np.sum((w * v) ** 2, axis=0) / whole**2))) + TINY
-    local, at = _stretch((w * e).sum(axis=1), place)
-    return Unexplained(
-        kind=kind, excess_um=1e3 * float(np.sqrt(max(mean, 0.0))), z=mean / doubt,
-        local_um=1e3 * float(np.sqrt(max(local, 0.0))), where=at, energy=np.sum(w * e, axis=0),
-    )  # fmt: skip
+    return Unexplained(kind, 1e3 * float(np.sqrt(max(mean, 0.0))), mean / doubt)
 
 
 def _inflation(problem: Problem, k: int, kind: str, values: Floats) -> Floats:
@@ -166,25 +155,6 @@ def _inflation(problem: Problem, k: int, kind: str, values: Floats) -> Floats:
     return np.ones_like(values)
 
 
-LOCAL_BLOCKS = 5  # of a stretch in which something acts for a while
-
-
-def _stretch(each: Floats, place: Sequence[tuple[int, float, float]]) -> tuple[float, tuple[int, float, float]]:
-    """The stretch of blocks of one run with the largest mean, and where it lies."""
-    best, at = 0.0, place[0]
-    runs = np.array([p[0] for p in place])
-    for k in np.unique(runs):
-        mine = np.flatnonzero(runs == k)
-        n = min(LOCAL_BLOCKS, len(mine))
-        if n == 0:
-            continue
-        mean = np.convolve(each[mine], np.ones(n) / n, mode="valid")
-        i = int(np.argmax(mean))
-        if mean[i] > best:
-            best, at = float(mean[i]), (int(k), place[mine[i]][1], place[mine[i + n - 1]][2])
-    return best, at
-
-
 def worst(left: Mapping[str, Unexplained]) -> Unexplained:
     """The kind that leaves most."""
-    return max(left.values(), key=lambda each: max(each.excess_um, 0.5 * each.local_um))
+    return max(left.values(), key=lambda each: each.excess_um)

@@ -160,7 +160,7 @@ def score_(folder, results, jobs, only, listed):
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the fixed set, made if missing.")
 @click.argument("constants", nargs=-1, metavar="MODULE:NAME...")
 def sensitivity_(out, constants):
-    """Halve and double constants below camcomp/diagnosis, e.g. search.cause_search:GATE_LOCAL, and count answers that differ."""
+    """Halve and double constants below camcomp/diagnosis, e.g. search.cause_search:LEFT_OPEN, and count answers that differ."""
     bench = changes.Bench([(each.split(":")[0], each.split(":")[1]) for each in constants])
     for each in changes.written(out):
         bench.ask(each)

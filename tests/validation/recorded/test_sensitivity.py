@@ -10,7 +10,7 @@ def test_a_constant_that_decides_is_told_from_one_that_does_not_and_from_one_tha
     gate, listed, milled = (
         ("axis.block_least_squares", "LEAST_Z"),
         ("axis.plausible", "NEAR"),
-        ("search.cause_search", "GATE_LOCAL"),
+        ("search.cause_search", "LEFT_OPEN"),
     )
     for name in ("SET", "AXES", "POSES"):
         monkeypatch.setattr(sensitivity, name, ())
