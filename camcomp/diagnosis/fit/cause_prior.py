@@ -8,7 +8,10 @@ from camcomp.diagnosis.statistics.cause_sets import CausePrior
 
 
 def cause_prior(columns: Columns) -> CausePrior:
-    """Prior weights: every effect weighs the same; within an effect one value for all weighs half, or all targets the same."""
+    """Prior weights: every effect weighs the same; within an effect one value for all weighs half, or all targets the same.
+
+    Scanned values of a shape are equally likely, and so are the intervals of what acts for a while.
+    """
     candidates = columns.candidates  # what follows outlives these columns, which are large
     names = sorted({a.name for a in candidates})
     weight = []
@@ -18,7 +21,8 @@ def cause_prior(columns: Columns) -> CausePrior:
         share = (
             1.0 / len(same) if not common or len(same) == 1 else (0.5 if a.target is None else 0.5 / (len(same) - 1))
         )
-        sought = log_intervals(len(columns.blocks)) if any(p.placed for p in a.shapes) else 0.0
+        sought = float(sum(np.log(len(p.scan)) for p in a.shapes if not p.placed))
+        sought += log_intervals(len(columns.blocks)) if any(p.placed for p in a.shapes) else 0.0
         weight.append(np.log(share / len(names)) - sought)
 
     def exclusive(i: int, j: int) -> bool:

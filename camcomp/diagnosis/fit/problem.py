@@ -20,7 +20,6 @@ from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members,
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
-from camcomp.diagnosis.statistics.shape_evidence import SoughtShape
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.ground.errors import PhysicsError
 from camcomp.model.effect import Cause, Parameter
@@ -161,7 +160,7 @@ class Problem:
         theta = self._bounded(members, theta)
         white = [W[:, index] for W in self.white]
         left = list(self.white_residual)
-        bent, sought = False, dict[int, list[SoughtShape]]()
+        bent = False
         passes += (1 if shapes else 0) + (FOLLOWED if self._ringing(members) else 0)
         far, most = False, passes + FARTHER
         for step in range(most):
@@ -186,7 +185,7 @@ class Problem:
             change, theta = after - theta, after
             size = float(change @ np.linalg.solve(full[np.ix_(index, index)] + 1e-18 * np.eye(len(index)), change))
             if self.shapes_of(members) and (step < passes - 1 or (far and step < most - 1)):
-                size, far, sought = self._move_shapes(
+                size, far = self._move_shapes(
                     members=members, theta=theta, shapes=shapes, left=left, white=white, mean=mean
                 )
             else:
@@ -204,7 +203,7 @@ class Problem:
         mean, full = estimate(total(grams), self.prior, index)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
         return Fitted(
-            members=members, theta=theta, covariance=covariance, log_evidence=scale(members, sought), grams=grams,
+            members=members, theta=theta, covariance=covariance, log_evidence=scale(members), grams=grams,
             extra=shapes, white=tuple(white), residual=tuple(left), pushed=pushed, pushed_at=pushed_at,
         )  # fmt: skip
 
@@ -413,11 +412,10 @@ class Problem:
     def _move_shapes(
         self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]], left: Sequence[Floats],
         white: Sequence[Floats], mean: Floats,
-    ) -> tuple[float, bool, dict[int, list[SoughtShape]]]:  # fmt: skip
+    ) -> tuple[float, bool]:  # fmt: skip
         """One Gauss-Newton step of the scanned shapes at their best amplitudes, within reach of the scan.
 
-        By how much chi-square it moves the model, whether it would go further, and how well the shapes are known beside the
-        members' sizes; shapes that the data do not ask to move stay.
+        By how much chi-square it moves the model, and whether it would go further; shapes that the data do not ask to move stay.
         """
         names, index = self.shapes_of(members), self.member_columns(members)
         others = mean.copy()
@@ -428,8 +426,6 @@ class Problem:
         rest = rest - A[:, : len(index)] @ theta
         size = np.linalg.norm(A, axis=0) + 1e-12
         step = np.linalg.lstsq(A / size, rest, rcond=1e-8)[0] / size
-        # parameters that rows do not determine keep almost no information
-        known = size**2 / np.diag(np.linalg.inv((A / size).T @ (A / size) + 1e-10 * np.eye(len(size))))
         most = np.array([reach(p, shapes[i][p.name]) * shapes[i][p.name] for i, p in names])
         whole = float(np.min(most / np.maximum(np.abs(step[len(index) :]), 1e-300)))
         step *= min(1.0, whole)
@@ -438,9 +434,4 @@ class Problem:
             for (i, p), s in zip(names, step[len(index) :], strict=True):
                 high = longest(self.bench, self.columns.candidates[i], p)
                 shapes[i][p.name] = float(np.clip(shapes[i][p.name] + s, p.low, max(high, p.low)))
-        sought = dict[int, list[SoughtShape]]()
-        for (i, p), of in zip(names, known[len(index) :], strict=True):
-            value = abs(shapes[i][p.name])
-            span = float(np.ptp(np.log(np.abs([each for each in p.scan if each] or [1.0]))))
-            sought.setdefault(i, []).append(SoughtShape(float(np.log(value or 1.0)), value**2 * float(of), span))
-        return moves, whole < 1.0 and moves > BENT, sought
+        return moves, whole < 1.0 and moves > BENT

@@ -20,7 +20,6 @@ from camcomp.diagnosis.statistics.evidence import (
     misfit,
 )
 from camcomp.diagnosis.statistics.probability import TEMPERATURE
-from camcomp.diagnosis.statistics.shape_evidence import SoughtShape, shape_log_evidence
 from camcomp.ground.datatypes import Floats
 
 Members = tuple[int, ...]
@@ -138,8 +137,8 @@ class Scale:
         self.prior, self.candidates = prior, candidates
         self.base = base(data, prior)
 
-    def __call__(self, members: Members, sought: Mapping[int, Sequence[SoughtShape]] | None = None) -> float:
-        """Log evidence of a set; sought: shapes by candidate at whose best values the columns are."""
+    def __call__(self, members: Members) -> float:
+        """Log evidence of a set."""
         columns = self.candidates.columns
         none = self.base.log_evidence - holding_back(self.base, self.prior, [c for i in members for c in columns[i]])
         if not members:
@@ -147,8 +146,7 @@ class Scale:
         ways = self.candidates.ways(members)
         sets = [[[c for i in group for c in columns[i]] for group in groups] for _, groups in ways]
         odds = np.array([each for each, _ in ways])
-        shapes = [shape_log_evidence(groups, sought or {}) for _, groups in ways]
-        return none + log_sum(odds + shapes + log_bayes(self.base, self.prior, sets)) - log_sum(odds)
+        return none + log_sum(odds + log_bayes(self.base, self.prior, sets)) - log_sum(odds)
 
 
 def scored(scale: Scale, sets: Iterable[Members]) -> list[tuple[float, Members]]:
