@@ -23,7 +23,7 @@ from camcomp.diagnosis.statistics.cause_sets import (
     total,
 )
 from camcomp.diagnosis.statistics.evidence import misfit
-from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN, TEMPERATURE
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
 from camcomp.diagnosis.statistics.ranking import Ranking, rank
 from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.ground.datatypes import Floats
@@ -174,7 +174,7 @@ def _credible(
         unknown = unknown_kind(problem, f, beyond) is not None
         kept = foretelling(problem, f) if unknown else f.members
         if kept == f.members:
-            credible = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
+            credible = credibility(problem, f, surely=unknown)
             replaced = credible.replaced
             most = max(replaced, key=lambda i: replaced[i], default=None)
             if most is None or replaced[most] < EVEN:

@@ -26,6 +26,7 @@ from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.search.unknown import joint_products, smooth_in_time
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, parts_of
 from camcomp.diagnosis.statistics.evidence import Gram, base, holding_back, log_bayes
+from camcomp.diagnosis.statistics.probability import TEMPERATURE
 from camcomp.diagnosis.statistics.score_test import JointProducts
 from camcomp.ground.datatypes import Floats, Ints
 
@@ -40,7 +41,7 @@ class Credibility:
     replaced: Mapping[int, float]
 
 
-def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float) -> Credibility:
+def credibility(problem: Problem, f: Fitted, *, surely: bool) -> Credibility:
     """How sure the members of f are; surely: whether something unmodelled acts for certain."""
     members = f.members
     if not members:
@@ -55,18 +56,16 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float
         for data, log_size in scales
         for each in _alone(problem, f, data, prior)
     ]
-    each_kind = [
-        _present_and_replaced([*kind, *(() if surely else alone)], temperature) for kind in (covariate, smooth) if kind
-    ]
+    each_kind = [_present_and_replaced([*kind, *(() if surely else alone)]) for kind in (covariate, smooth) if kind]
     present, replaced = np.min([p for p, _ in each_kind], axis=0), np.max([r for _, r in each_kind], axis=0)
     return Credibility(
         dict(zip(members, present.tolist(), strict=True)), dict(zip(members, replaced.tolist(), strict=True))
     )
 
 
-def _present_and_replaced(found: Sequence[_Hypothesis], temperature: float) -> tuple[Floats, Floats]:
+def _present_and_replaced(found: Sequence[_Hypothesis]) -> tuple[Floats, Floats]:
     """Of every member (d,): the probability that it acts, and that something unmodelled acts in its place."""
-    value = np.array([each.evidence / temperature + each.prior for each in found])
+    value = np.array([each.evidence / TEMPERATURE + each.prior for each in found])
     p = np.exp(value - logsumexp(value))
     there = np.array([each.there for each in found])
     return p @ there, (p * [each.unmodelled for each in found]) @ (1.0 - there)

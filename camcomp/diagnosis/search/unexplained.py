@@ -17,6 +17,7 @@ from scipy.special import log_ndtr, ndtri
 from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.floor import row_scatter
 from camcomp.diagnosis.fit.outliers import TINY
+from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
@@ -24,7 +25,6 @@ from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.diagnosis.statistics.shrinkage import SURELY
 from camcomp.ground.datatypes import Bools, Floats
 
-KINDS = ("tip", "encoder", "drive", "dyno")
 SURE_Z = 5.0  # standard deviations of chance
 
 

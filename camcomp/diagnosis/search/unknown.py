@@ -14,7 +14,7 @@ from camcomp.diagnosis.model.group import SmoothProcess
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate
-from camcomp.diagnosis.statistics.score_test import JointProducts, Patterns, ResidualTest, score_test
+from camcomp.diagnosis.statistics.score_test import JointProducts, ResidualTest, score_test
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
@@ -36,9 +36,7 @@ def joint_products(problem: Problem, f: Fitted, weight: Sequence[Sequence[float]
     labels = [words.labels for words in problem.dictionaries]
     kinds = [words.kind for words in problem.dictionaries]
     return JointProducts.of(
-        Patterns(
-            white=white, residual=residual, blocks=problem.white_patterns, labels=labels, kinds=kinds, weight=weight
-        )
+        white=white, residual=residual, blocks=problem.white_patterns, labels=labels, kinds=kinds, weight=weight
     )
 
 
@@ -93,13 +91,7 @@ def about(problem: Problem, f: Fitted) -> tuple[list[ByChannel], list[Floats]]:
 
 def firm_prior(problem: Problem) -> Prior:
     """The prior to describe an unknown effect with: everything else is as stated, and no tolerance stretches to follow it."""
-    return _held(problem.prior, np.flatnonzero(np.isfinite(problem.prior.tolerance)))
-
-
-def _held(prior: Prior, columns: Ints) -> Prior:
-    tolerance = prior.tolerance.copy()
-    tolerance[columns] *= 1e-3
-    return replace(prior, tolerance=tolerance)
+    return replace(problem.prior, tolerance=1e-3 * problem.prior.tolerance)
 
 
 def rows_by_kind(problem: Problem) -> dict[str, int]:

@@ -35,20 +35,6 @@ class ResidualTest:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Patterns:
-    """Patterns (p) of all runs, white. white (w, k), residual (w,) per run; blocks per run and kind, whose rows follow each
-    other in `white`; labels: covariates of the patterns per kind; weight: of a row, per run and kind.
-    """
-
-    white: Sequence[ByChannel]
-    residual: Sequence[Floats]
-    blocks: Sequence[Sequence[ByChannel]]
-    labels: Sequence[Sequence[str]]
-    kinds: Sequence[str]
-    weight: Sequence[Sequence[float]] | None = None
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
 class JointProducts:
     """Products of columns (k), residual and patterns (p): data of the columns, B (k, p), h (p,), P (p, p); labels, kinds (p,).
 
@@ -64,24 +50,36 @@ class JointProducts:
     rows: float
 
     @staticmethod
-    def of(patterns: Patterns) -> JointProducts:
-        """Sum over runs."""
-        k, p = patterns.white[0].width, sum(map(len, patterns.labels))
+    def of(
+        *,
+        white: Sequence[ByChannel],
+        residual: Sequence[Floats],
+        blocks: Sequence[Sequence[ByChannel]],
+        labels: Sequence[Sequence[str]],
+        kinds: Sequence[str],
+        weight: Sequence[Sequence[float]] | None = None,
+    ) -> JointProducts:
+        """Sum over runs of white columns (w, k) and residuals (w,).
+
+        blocks: white patterns per run and kind, whose rows follow each other in `white`. labels: covariates of the patterns
+        per kind. weight: of a row, per run and kind.
+        """
+        k, p = white[0].width, sum(map(len, labels))
         A, B, P, rows = np.zeros((k + 1, k + 1)), np.zeros((k + 1, p)), np.zeros((p, p)), 0.0
-        for run, (W, r, parts) in enumerate(zip(patterns.white, patterns.residual, patterns.blocks, strict=True)):
+        for run, (W, r, parts) in enumerate(zip(white, residual, blocks, strict=True)):
             joint, row, at = W.appended(r[:, None]), 0, 0
-            for kind, (part, names) in enumerate(zip(parts, patterns.labels, strict=True)):
-                square = 1.0 if patterns.weight is None else patterns.weight[run][kind] ** 2
+            for kind, (part, names) in enumerate(zip(parts, labels, strict=True)):
+                square = 1.0 if weight is None else weight[run][kind] ** 2
                 own, to = joint[row : row + len(part)], slice(at, at + len(names))
                 A += square * (own.T @ own)
                 B[:, to] += square * (own.T @ part)
                 P[to, to] += square * (part.T @ part)
                 row, at, rows = row + len(part), at + len(names), rows + square * len(part)
-        kinds = tuple(kind for kind, each in zip(patterns.kinds, patterns.labels, strict=True) for _ in each)
-        names = tuple(name for each in patterns.labels for name in each)
+        of_each = tuple(kind for kind, each in zip(kinds, labels, strict=True) for _ in each)
+        names = tuple(name for each in labels for name in each)
         return JointProducts(
             data=Gram(A[:k, :k], A[:k, k], float(A[k, k]), round(rows)), B=B[:k], h=B[k], P=P, labels=names,
-            kinds=kinds, rows=rows,
+            kinds=of_each, rows=rows,
         )  # fmt: skip
 
     def projected(self, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:

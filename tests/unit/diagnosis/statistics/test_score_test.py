@@ -5,7 +5,7 @@ import pytest
 
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Gram, Prior
-from camcomp.diagnosis.statistics.score_test import JointProducts, Patterns, score_test
+from camcomp.diagnosis.statistics.score_test import JointProducts, score_test
 
 
 def test_a_pattern_given_twice_counts_once():
@@ -27,7 +27,7 @@ def test_normal_equations_of_patterns_are_those_of_the_stacked_rows(weight):
     prior = Prior(np.array([0.1, 0.2]), np.ones(2), np.zeros(2), np.full(2, np.inf))
     W, r = [rng.normal(size=(30, 2)) for _ in range(2)], [rng.normal(size=30) for _ in range(2)]
     D = [[rng.normal(size=(20, 2)), rng.normal(size=(10, 1))] for _ in range(2)]
-    patterns = Patterns(
+    joint = JointProducts.of(
         white=[ByChannel.of([w[:20], w[20:]]) for w in W],
         residual=r,
         blocks=[[ByChannel.of([d]) for d in run] for run in D],
@@ -35,7 +35,6 @@ def test_normal_equations_of_patterns_are_those_of_the_stacked_rows(weight):
         kinds=["tip", "drive"],
         weight=weight,
     )
-    joint = JointProducts.of(patterns)
     P, h = joint.projected(prior, [0])
 
     factor = [np.repeat(w, [20, 10]) for w in weight or [[1.0, 1.0]] * 2]
