@@ -1,6 +1,6 @@
 """The search for causes on one problem: sets are fitted, answers among them weighed, and probabilities stated."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -108,16 +108,31 @@ class _Kept:
 
 
 def _keep_causes(problem: Problem, best: Fitted, sets: FittedSets) -> _Kept:
-    """Test for an unmodelled effect jointly with the best answer, and select the members that are kept."""
-    beyond = unexplained(problem, sets.fit(best.all_members))  # minor effects explain their part, too
-    kind = unknown_kind(problem, best, beyond)
-    known, credible, instead = _credible(problem, best, beyond, sets.fit)
-    if kind is None and known.members and is_at_floor(problem, known):
+    """Drop members of the best answer, one by one, that an unmodelled effect explains as well.
+
+    Where one shows, members that do not predict withheld runs jointly with it are dropped first. What replaces a member
+    above the size that counts shows, too.
+    """
+    f, beyond = best, unexplained(problem, sets.fit(best.all_members))  # minor effects explain their part, too
+    kind = at_first = unknown_kind(problem, best, beyond)
+    instead = False
+    while True:
+        kept = foretelling(problem, f) if kind else f.members
+        if kept == f.members:
+            found = credibility(problem, f, surely=kind is not None)
+            most = max(found.replaced, key=lambda i: found.replaced[i], default=None)
+            if most is None or found.replaced[most] < EVEN:
+                break
+            instead = instead or problem.moved_um(f, (most,)) > _least(problem, _modelled(problem, f))
+            kept = tuple(i for i in f.members if i != most)
+        f = sets.fit(kept)
+        beyond = unexplained(problem, f)
+        kind = unknown_kind(problem, f, beyond)
+    if at_first is None and f.members and is_at_floor(problem, f):
         return _Kept(sets.null, {}, beyond, None, False)
-    if known.members != best.members:
-        beyond = unexplained(problem, known)
-        kind = unknown_kind(problem, known, beyond) or (worst(beyond).kind if kind or instead else None)
-    return _Kept(known, credible, beyond, kind, bool(above_floor(problem, beyond)))
+    if kind is None and (at_first or instead):
+        kind = worst(beyond).kind
+    return _Kept(f, found.present, beyond, kind, bool(above_floor(problem, beyond)))
 
 
 def _with_answer(problem: Problem, sets: RankedSets, known: Fitted) -> RankedSets:
@@ -156,33 +171,6 @@ def _describe_residual(problem: Problem, kept: _Kept) -> tuple[dict[str, Residua
     """Covariates of the residual per kind of channel, and the kind in which something unmodelled shows."""
     left = residual_tests(problem, kept.known, problem.prior if kept.kind is None else firm_prior(problem))
     return left, kept.kind if kept.kind is None or kept.kind in left else next(iter(left))
-
-
-def _credible(
-    problem: Problem,
-    f: Fitted,
-    beyond: Mapping[str, Unexplained],
-    fit: Callable[[Members], Fitted],
-) -> tuple[Fitted, dict[int, float], bool]:
-    """Drop members, one by one, that an unmodelled effect explains as well; return the reduced fit, the probabilities
-    of its members, and whether an unmodelled effect replaced a member above the size that counts.
-
-    Where an unmodelled effect shows, members that do not predict withheld runs jointly with it are dropped first.
-    """
-    instead = False
-    while True:
-        unknown = unknown_kind(problem, f, beyond) is not None
-        kept = foretelling(problem, f) if unknown else f.members
-        if kept == f.members:
-            credible = credibility(problem, f, surely=unknown)
-            replaced = credible.replaced
-            most = max(replaced, key=lambda i: replaced[i], default=None)
-            if most is None or replaced[most] < EVEN:
-                return f, dict(credible.present), instead
-            instead = instead or problem.moved_um(f, (most,)) > _least(problem, _modelled(problem, f))
-            kept = tuple(i for i in f.members if i != most)
-        f = fit(kept)
-        beyond = unexplained(problem, f)
 
 
 def above_floor(problem: Problem, beyond: Mapping[str, Unexplained], modelled_um: float = 0.0) -> list[Unexplained]:
