@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.diagnosis.axis.gate import AxisGate
+from camcomp.diagnosis.axis.gate import STRETCHES, AxisGate
 from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, spikes
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
 from camcomp.diagnosis.result.types import FoundCause, Law, LawPart
@@ -22,7 +22,6 @@ FIRST_MOVE_MM = 0.2  # after which friction has its sense
 MOVING = 0.1  # of the fastest row's way
 FAR = 10.0  # times as far goes an axis that moves
 ANSWER_S = (0.02, 0.3)  # ahead of a push, and behind it until a loop has answered
-BLOCKS = 25  # of all runs, in which the size of a residual is compared
 GAP_MARGIN_ROWS = 5  # rows of which a gap leaves speed and acceleration uncertain
 
 
@@ -160,8 +159,8 @@ class AxisDeviation:
 
 
 def block_squares(values: Sequence[Floats]) -> Floats:
-    """Mean squares (b,) of values (n,) per run in BLOCKS blocks of equally many rows."""
-    each = max(BLOCKS // len(values), 2)
+    """Mean squares (b,) of values (n,) per run in STRETCHES blocks of equally many rows."""
+    each = max(STRETCHES // len(values), 2)
     return np.array([np.mean(part**2) for own in values for part in np.array_split(own, each)])
 
 

@@ -156,6 +156,8 @@ def _found(rows: AxisRows) -> FoundLaw | None:
     for _ in range(FIT_AGAIN):
         some = at_drive(rows.sizes(rows.spot), False)
         forms = [f for f in some if f.family != "wave" and f.about != ("common_s",)]
+        if not forms and not waves:  # an axis that stands
+            return None
         grids = grids_of(rows, [((rows.spot,), [*forms, *waves])])
         found = find_law(rows, lambda split, _: rows.folds(split), grids, rows.floor)
         if found is None:

@@ -24,7 +24,6 @@ from camcomp.diagnosis.result.types import UNKNOWN, AxisMoves, NextExperiment, S
 from camcomp.diagnosis.statistics.expected_gain import expected_gain
 from camcomp.ground.datatypes import Floats
 
-MOST_BLOCKS = 4
 BLOCK_S = 20.0  # of strokes; one there and back at least
 LONGEST_S = 60.0  # of one there and back
 LENGTHS = (1.0, 0.3, 0.05)  # of the travel that the runs had
@@ -113,7 +112,7 @@ def _designed(axis: AxisFindings, logs: Sequence[AxisRun], verdict: str) -> tupl
         axis=axis.name, unit="rad" if logs[0].revolute else "mm", blocks=(), acceleration=_tidy(hardest), step_s=step
     )
     best, bits, value = blank, 0.0, 0.0
-    for _ in range(MOST_BLOCKS):
+    while True:
         found = []
         for block in _blocks(low, high, fastest, hardest):
             moves = blank.model_copy(update={"blocks": (*best.blocks, block)})

@@ -52,8 +52,8 @@ def probability_with_unmodelled(
 
     own = across(effect)
     size, whole = (float(np.sqrt(np.mean(each**2))) for each in (own, effect))
-    if not (excess > 0.0 and size > 0.0 and functions):
-        return float(expit(odds))
+    if not (excess > 0.0 and size > 0.0):
+        return 1.0 if size > 0.0 else float(expit(odds))
     e, slabs = own / np.linalg.norm(own), np.array(WIDTHS) * floor * size / whole
     without, with_cause, weight = [], [], []
     for gain, B in functions.values():

@@ -71,3 +71,12 @@ def test_nothing_is_left_where_nothing_is_wrong():
     (moved,) = axis.following.moves
     told = travel(run.time, run.setpoint, axis.wide).of(np.isin(run.time, moved.time))
     assert axis_law("x", axis.force, axis.following, [told]) is None
+
+
+def test_an_axis_that_stands_has_no_law():
+    rng = np.random.default_rng(1)
+    t = np.arange(0.0, 4.0, 2e-3)
+    still = np.full(len(t), 12.5)
+    force = 3.0 + 5.0 * np.sin(9.0 * t) + 0.2 * rng.standard_normal(len(t))
+    result, _ = studied({"x": [AxisRun(name="r", time=t, setpoint=still, encoder=still, force=force)]})
+    assert result.law is None

@@ -42,6 +42,8 @@ def test_stated_probabilities_come_true():
     assert np.mean(present[p < 0.3]) < 0.4
 
 
-def test_without_anything_unmodelled_the_prior_stays():
+def test_without_anything_unmodelled_a_cause_is_sure_and_without_an_effect_the_prior_stays():
     one = np.ones((50, 1))
-    assert probability_with_unmodelled(one[:, 0], 0.0 * one, {}, excess=0.0, floor=1.0, noise=1.0, odds=0.0) == 0.5
+    given = {"excess": 0.0, "floor": 1.0, "noise": 1.0, "odds": 0.0}
+    assert probability_with_unmodelled(one[:, 0], 0.0 * one, {}, **given) == 1.0
+    assert probability_with_unmodelled(0.0 * one[:, 0], one, {}, **given) == 0.5
