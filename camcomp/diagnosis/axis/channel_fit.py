@@ -28,7 +28,6 @@ from camcomp.diagnosis.model.imitation import probability_with_unmodelled
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.model.search import search_sets
 from camcomp.diagnosis.result.types import Estimate, FoundCause
-from camcomp.diagnosis.statistics.probability import stated
 from camcomp.ground.datatypes import Floats
 
 STEP = 1e-3  # of an amplitude in scales, for slopes
@@ -56,12 +55,6 @@ class ChannelFit:
     drivers: Mapping[str, float]
     hints: Mapping[str, float]
     imitated: tuple[float, ...] = ()
-
-    def with_unmodelled(self) -> ChannelFit:
-        """The fit with probabilities of causes jointly with an unmodelled effect."""
-        both = zip(self.causes, self.imitated, strict=False)
-        causes = [c.model_copy(update={"probability": min(c.probability, stated(p))}) for c, p in both]
-        return replace(self, causes=(*causes, *self.causes[len(causes) :]))
 
     def combined(self, weights: Mapping[str, Sequence[float]]) -> Estimate:
         """A sum of healthy sizes, by kind, with its 95 % interval."""

@@ -214,6 +214,7 @@ class AxisFindings:
     revolute: bool = False
     wide: int = WIDE[0]
     causes: list[FoundCause] = field(default_factory=list)
+    imitated: dict[str, float] = field(default_factory=dict)  # effect -> probability beside something unmodelled
     following: AxisChannel | None = None
     force: AxisChannel | None = None
     behind: AxisChannel | None = None
@@ -224,6 +225,13 @@ class AxisFindings:
     details: dict[str, Any] = field(default_factory=dict)
     law: Law | None = None
     laws: list[LawPart] = field(default_factory=list)  # of its following error, as the machine file has them
+
+    def copied(self) -> AxisFindings:
+        """The findings with lists of their own."""
+        return replace(
+            self, causes=[*self.causes], unknown_in=[*self.unknown_in], details={**self.details},
+            imitated={**self.imitated},
+        )  # fmt: skip
 
     @property
     def channels(self) -> list[AxisChannel]:

@@ -144,7 +144,7 @@ def study_channel(
     found: AxisFindings, rows: JointRows, around: AxisSurroundings, without: set[str]
 ) -> tuple[AxisFindings, AxisChannel]:
     """Findings on an axis with one more channel and its causes."""
-    found = replace(found, causes=[*found.causes], unknown_in=[*found.unknown_in], details={**found.details})
+    found = found.copied()
     seen = [np.isin(run.time, m.time) for run, m in zip(rows.runs, rows.moves, strict=True)]
     axes = [around.driven(found.name, run) for run in rows.runs]
     if rows.channel == "force":
@@ -192,9 +192,9 @@ def study_channel(
     if channel.gate is not None:
         found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
         if channel.gate.word == "above":
-            done = done.with_unmodelled()
             found.unknown_in += sorted((done.drivers or done.hints).items(), key=lambda each: -each[1])
     found.causes += done.causes
+    found.imitated |= {c.effect: p for c, p in zip(done.causes, done.imitated, strict=False)}
     return found, channel
 
 

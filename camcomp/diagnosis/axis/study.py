@@ -121,7 +121,9 @@ def _every_axis(
     for a in found:
         _nothing_below_the_floor(a)
         if a.strange:
-            a.causes = [c.model_copy(update={"probability": with_discrepancy(c.probability)}) for c in a.causes]
+            p = [min(c.probability, a.imitated.get(c.effect, 1.0)) for c in a.causes]
+            both = zip(a.causes, p, strict=True)
+            a.causes = [c.model_copy(update={"probability": with_discrepancy(own)}) for c, own in both]
     return found
 
 
@@ -287,8 +289,8 @@ def _name_rest(found: AxisFindings) -> None:
                 if _of_time(channel, found.ripple.period):
                     found.unknown_in.append((f"time:{found.name}", stretches))
                 continue
-            if channel.gate.intervals:
-                found.unknown_in.append((f"time:{found.name}", stretches))
+            beyond = max(1.0 - channel.floor**2 / max(float(np.mean(channel.last)), 1e-300), 0.0)
+            found.unknown_in.append((f"time:{found.name}", stretches or beyond))
 
 
 def _of_time(channel: AxisChannel, period: float) -> bool:
