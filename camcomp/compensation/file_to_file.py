@@ -13,6 +13,8 @@ from camcomp.compensation.report.tables import JointTable
 from camcomp.ground.errors import ProgramError
 from camcomp.ground.files import writing
 from camcomp.model.job import Job
+from camcomp.model.signal_path import has_memory
+from camcomp.model.statics.masses import has_moved_mass
 
 if TYPE_CHECKING:
     from camcomp.compensation.program.totals import Totals
@@ -57,7 +59,15 @@ def is_for_pieces(source: BinaryIO, job: Job, settings: CorrectionSettings) -> b
     """Whether a seekable program is long enough, and machine and method are such, that it is corrected in pieces."""
     size = source.seek(0, 2)
     source.seek(0)
-    return size >= LONG and settings.method == "newton" and not job.causes and len(job.machine.actuators) == 3
+    return size >= LONG and settings.method == "newton" and len(job.machine.actuators) == 3 and _goes_in_pieces(job)
+
+
+def _goes_in_pieces(job: Job) -> bool:
+    """Whether what effects do at a point depends on the piece of the program alone, and on the time before it."""
+    if not job.causes:
+        return True
+    simple = not job.config.uncertain and not has_moved_mass(job.real_machine.robot)  # masses look ahead
+    return simple and not has_memory(job.causes)
 
 
 def compensate_in_pieces(

@@ -59,8 +59,14 @@ def momentary(causes: Sequence[Cause]) -> bool:
 
 
 def has_memory(causes: Sequence[Cause]) -> bool:
-    """Whether the response at a point depends on the points before it: control loops, and drives with a memory."""
-    return bool(acting(causes, "control")) or not momentary(causes)
+    """Whether the response at a point may depend on the points before it: all but changes of robot and clamping, and momentary drives."""
+    return not all(_acts_pointwise(cause.effect) for cause in causes)
+
+
+def _acts_pointwise(effect: Any) -> bool:
+    hooks = {hook for hook in HOOKS if hasattr(effect, hook)}
+    still = {"on_robot", "on_workpiece"}  # which do not see the motion
+    return bool(hooks) and hooks <= still | (set(_AT["drive"]) if getattr(effect, "MOMENTARY", False) else set())
 
 
 def controlled(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> Floats:

@@ -63,14 +63,25 @@ def measure(times: int) -> None:
 
 def page(result: dict[str, Any]) -> str:
     """The page of a result."""
+    least = min(
+        each["memory_mb"] for each in result["rows"]
+    )  # that of the measuring process, which a child begins with
     rows = [
-        f"| {each['lines']:,} | {each['seconds']:.2f} s | {_per_line(each):.3g} µs | {each['memory_mb']:.0f} MB | "
-        f"{each['pygcode_s']:.3g} s | {each['pygcode_s'] / each['seconds']:.2g} |".replace(",", " ")
+        f"| {each['lines']:,} | {each['seconds']:.2f} s | {_three_digits(_per_line(each))} µs | {_memory(each, least)} | "
+        f"{_three_digits(each['pygcode_s'])} s | {each['pygcode_s'] / each['seconds']:.2f} |".replace(",", " ")
         for each in result["rows"]
     ]
     return PAGE.format(
         commit=result["commit"], date=result["date"], rows="\n".join(rows), most=f"{READ_WHOLE:,}".replace(",", " ")
     )
+
+
+def _three_digits(value: float) -> str:
+    return f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
+
+
+def _memory(row: Row, least: float) -> str:
+    return f"{'up to ' if row['memory_mb'] <= least else ''}{row['memory_mb']:.0f} MB"
 
 
 def _per_line(row: Row) -> float:

@@ -103,17 +103,21 @@ class InterpolatedMachine:
                 value[rows] = getattr(own, each.name)
         return replace(state, **changed)
 
-    def proof(self, target: Floats, force: Floats) -> Interpolation | None:
-        """Differences of a sample of points (n, 3) under forces (n, 3) to their exact solutions; None: nothing was asked."""
+    def proof(self, target: Floats, force: Floats) -> tuple[Interpolation | None, int]:
+        """Differences of a sample of points (n, 3) under forces (n, 3) to their exact solutions, and the most iterations.
+
+        None and 0: nothing was asked.
+        """
         if self._field is None:
-            return None
+            return None, 0
         chosen = np.random.default_rng(len(target)).permutation(len(target))[:SAMPLE]
         p, f = target[chosen], force[chosen]
         aimed, free = self.solve(TARGET, p, f, None), self.solve(FREE, p, f, None)
         exact = correct(self.machine, p, f)
         tip, settled = settle(self.machine, p, f)
         gaps, drive = (aimed.commanded - exact.commanded, free.tip - tip), free.drive - settled.drive
-        return judge(self._field, gaps, aimed.rho - exact.rho, drive, 2 * len(p) + self._exact)
+        found = judge(self._field, gaps, aimed.rho - exact.rho, drive, 2 * len(p) + self._exact)
+        return found, int(exact.iterations.max(initial=0))
 
 
 def compensate_whole(program: Program, job: Job, *, method: str, **settings: Any) -> Compensated:
@@ -124,7 +128,8 @@ def compensate_whole(program: Program, job: Job, *, method: str, **settings: Any
     job = with_answers(job)
     found = compensate(program, job, method=method, **settings)
     at = job.frame.to_machine(found.rows.target), job.frame.vectors(found.rows.force)
-    return replace(found, interpolated=job.real_machine.answers.proof(*at))
+    interpolated, iterations = job.real_machine.answers.proof(*at)
+    return replace(found, interpolated=interpolated, iterations=max(found.iterations, iterations))
 
 
 def with_answers(job: Job) -> Job:

@@ -1,8 +1,9 @@
 """Long programs: read, corrected and written piece by piece, in constant memory.
 
 Runs of linear moves are corrected by interpolation between exact solutions (field.py). What stands between them, and
-all of a program whose machine file states uncertain numbers, is corrected with the lines next to it by compensate.py. At the end a random sample of the interpolated rows is solved exactly, and the largest difference is
-part of the result.
+all of a program whose machine file states effects or uncertain numbers, is corrected with the lines next to it by
+compensate.py. At the end a random sample of the interpolated rows is solved exactly, and the largest difference is part
+of the result.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from camcomp.compensation.long.proof import Sample
 from camcomp.compensation.long.runs import InterpretedRun, Runs
 from camcomp.compensation.long.totals import TotalsOfPieces
 from camcomp.compensation.program.compensate import compensate
-from camcomp.compensation.program.moves import raise_unsolved
+from camcomp.compensation.program.moves import minutes_of, raise_unsolved
 from camcomp.compensation.program.totals import JointTableRows
 from camcomp.gcode.output import Part
 from camcomp.gcode.setup import Setup
@@ -76,7 +77,9 @@ class LongProgram:
         self.totals = TotalsOfPieces(
             self.job, self.name, tolerance_um=self.tolerance_um, tabled=self.on_rows is not None
         )
-        self._pointwise = with_answers(self.job) if self.job.config.uncertain else self.job
+        self._by_points = bool(self.job.config.uncertain or self.job.causes)
+        self._pointwise = with_answers(self.job) if self._by_points else self.job
+        self._minutes = 0.0  # of the pieces so far
         self._sample = Sample(digest.hexdigest(), size)
         self._lines = max(lines, 1)
         self.totals.lines_in = lines
@@ -145,7 +148,7 @@ class LongProgram:
         return data[:at] + stamp + data[at:]
 
     def _corrected(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
-        if isinstance(piece.run, LinearRun) and not self.job.config.uncertain:
+        if isinstance(piece.run, LinearRun) and not self._by_points:
             return self._linear(piece.run, piece, before, after)
         return self._exactly(piece, before, after)
 
@@ -205,11 +208,13 @@ class LongProgram:
         if part.last - part.first != run.motions:
             raise NotInPieces
         engaged = self._engagement_of(piece, before, after)
-        here = row0 / self._lines
+        here, minutes = row0 / self._lines, minutes_of(self.job, program.path)
+        began = self._minutes - float(minutes[:first].sum())
+        self._minutes += float(minutes[part.first : part.last].sum())
         with part_of_work(here, here):
             result = compensate(
                 program, self._pointwise, method="newton", tolerance_um=self.tolerance_um, version=self.version, part=part,
-                arcs=self.arcs, engaged=None if engaged is None else Engaged.joined(engaged.parts(0, first, len(program.path) - 1)),
+                arcs=self.arcs, began_min=began, engaged=None if engaged is None else Engaged.joined(engaged.parts(0, first, len(program.path) - 1)),
             )  # fmt: skip
         own = (result.rows.motion >= part.first) & (result.rows.motion < part.last)
         assert result.written.behind is not None

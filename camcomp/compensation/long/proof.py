@@ -65,7 +65,7 @@ class Sample:
         """
         if self._points:
             target, force = np.split(np.concatenate(self._points), [3], axis=1)
-            return job.real_machine.answers.proof(target, force), 0
+            return job.real_machine.answers.proof(target, force)  # type: ignore[no-any-return]
         if corrector.field is None or not self._rows:
             return None, 0
         machine, sample = corrector.machine, np.concatenate(self._rows)

@@ -9,10 +9,10 @@ import numpy as np
 from camcomp.compensation.long.linear_corrector import CorrectedRun, LinearCorrector
 from camcomp.compensation.long.linear_run import LinearRun
 from camcomp.compensation.long.runs import Runs
-from camcomp.compensation.program.compensate import Compensated
+from camcomp.compensation.program.compensate import Compensated, warm_up_warnings
 from camcomp.compensation.program.control_account import ControlAccount, PointsOnMoves
 from camcomp.compensation.program.totals import JointTableRows, Totals
-from camcomp.compensation.program.under_control import control_warnings, programmed_moves, written_moves
+from camcomp.compensation.program.under_control import control_warnings
 from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.uncorrected import UncorrectedFeeds, below_step_warning
@@ -131,10 +131,9 @@ class TotalsOfPieces(Totals):
         program, control, (before, after) = result.program, result.control, self._control
         path, modes = program.path, program.modes
         self.modes |= {modes[k]: None for k in range(part.first, part.last) if path.kind[k] != RAPID}
-        before.add(programmed_moves(program, self.job).take(slice(part.first, part.last)))
-        moves = written_moves(program, self.job, result.rows, result.written, control.rest)
+        before.add(control.programmed.take(slice(part.first, part.last)))
         self.resting += int(control.rest.sum())
-        after.add(moves.take(own), control.points.take(slice(None), int(np.flatnonzero(own)[0])))
+        after.add(control.written.take(own), control.points.take(slice(None), int(np.flatnonzero(own)[0])))
 
     def finish(self, runs: Runs, stock: list[str]) -> None:
         """Collect the times and the warnings of all parts, also those of the stock."""
@@ -143,7 +142,7 @@ class TotalsOfPieces(Totals):
         self.times = (self._control[0].seconds, self._control[1].seconds)
         self.waiting_s = runs.waiting_s(self.job.config)
         feeds, control = self._feeds.warnings(), self._control[1]
-        self.warnings = [*runs.warnings, *feeds, *runs.behind_end]
+        self.warnings = [*runs.warnings, *feeds, *runs.behind_end, *warm_up_warnings(self.job)]
         self.warnings += control_warnings(
             tuple(self.modes), control.at_joins, control.elsewhere, exact_stop=runs.language.exact_stop,
             resting=self.resting, apart=self.apart,

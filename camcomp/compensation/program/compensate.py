@@ -122,7 +122,7 @@ class Compensated:
 
 def compensate(
     program: Program, job: Job, *, method: str, tolerance_um: float, version: str, part: Part | None = None,
-    arcs: bool | None = None, engaged: Engaged | None = None,
+    arcs: bool | None = None, engaged: Engaged | None = None, began_min: float = 0.0,
 ) -> Compensated:  # fmt: skip
     """The corrected program. Raises PhysicsError where the machine cannot do what is asked.
 
@@ -131,12 +131,12 @@ def compensate(
 
     part: the motions to be corrected and written, when the program is a part of a longer one. The others are only there
     because their neighbours depend on them: they are not divided, and their errors do not count. engaged: what the tool
-    meets along the path, when the program has been followed through its stock before.
+    meets along the path, when the program has been followed through its stock before. began_min: minutes before the part.
     """
     asked = job.config.compensation.arcs if arcs is None else arcs
     correction = _Correction(
         program=program, job=job, method=method, tolerance_um=tolerance_um, version=version, part=part,
-        engaged=engaged or job.engaged(program),
+        engaged=engaged or job.engaged(program), began_min=began_min,
     )  # fmt: skip
     found = correction.done(arcs=bool(asked))
     own = slice(None) if part is None else slice(part.first, part.last)
@@ -179,11 +179,12 @@ class _Correction:
     version: str
     part: Part | None
     engaged: Engaged | None
+    began_min: float
 
     def __post_init__(self) -> None:
         program, job, spacing = self.program, self.job, _spacing(self.job)
         self.step = program.step_mm(job.config.control.resolution_mm)
-        base = lay_track(program.path, job.conditions, self.engaged)
+        base = replace(lay_track(program.path, job.conditions, self.engaged), began_min=self.began_min)
         self.orienting = Orienting.of(program, job)
         if self.orienting is not None:
             refuse_unfollowed(job, self.method, self.part)
@@ -417,9 +418,9 @@ class _Correction:
 
     def _warnings(self, control: UnderControl, still: Ints) -> list[str]:
         program, job, track = self.program, self.job, self.track
-        out = _warm_up(job) + control.warnings(program.language)
-        out += [*self.turns.warning(), *spindle_warning(still)]
+        out = [*self.turns.warning(), *spindle_warning(still)]
         if self.part is None:
+            out = warm_up_warnings(job) + control.warnings(program.language) + out
             doubts = ForceDoubts(config=job.config)
             doubts.add(program.path)
             out += [*job.taken.remarks, *doubts.warnings()]
@@ -490,7 +491,7 @@ def _kept(track: Track, nodes: Nodes, correction: Floats, half: float) -> Bools:
     return out
 
 
-def _warm_up(job: Job) -> list[str]:
+def warm_up_warnings(job: Job) -> list[str]:
     """Warnings of effects whose machine counts as warming up."""
     if job.config.process.temperature_C is not None:
         return []

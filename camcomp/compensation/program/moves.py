@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.gcode.program import Program
+from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
 from camcomp.ground.errors import Location, PhysicsError, raise_all
 from camcomp.model.cutting.track import Track
@@ -121,11 +122,8 @@ def without_shared_ends(track: Track, piece: Ints, w: Floats) -> tuple[Ints, Flo
 
 def travel_of(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
     """Force and time of points in the order of travel. Rapids go at RAPID_FEED where the time matters."""
-    feed = track.path.feed[track.motion]
-    feed = np.where(np.isnan(feed), job.config.process.feed_mm_per_min or np.nan, feed)
-    rapid = (track.path.kind[track.motion] == RAPID) | ~(feed > 0.0)
-    minutes = track.length / np.where(rapid, RAPID_FEED, feed)
-    start = np.cumsum(minutes) - minutes
+    minutes = track.length / _speeds(job, track.path)[track.motion]
+    start = track.began_min + np.cumsum(minutes) - minutes
     cut = minutes * track.cutting
     worn = np.cumsum(cut) - cut
     force = job.frame.vectors(track.force(piece, w))
@@ -141,6 +139,17 @@ def travel_of(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
     return Travel(
         force=force, time=time, cut_min=worn[piece] + w * cut[piece], stop=stop, around=around, rotation=rotation
     )
+
+
+def minutes_of(job: Job, path: Path) -> Floats:
+    """Minutes (n,) of motions; rapids go at RAPID_FEED."""
+    return np.asarray(path_geometry.lengths(path) / _speeds(job, path))
+
+
+def _speeds(job: Job, path: Path) -> Floats:
+    """Feeds (n,) mm/min of motions, RAPID_FEED for rapids and where none is known."""
+    feed = np.where(np.isnan(path.feed), job.config.process.feed_mm_per_min or np.nan, path.feed)
+    return np.where((path.kind == RAPID) | ~(feed > 0.0), RAPID_FEED, feed)
 
 
 def _around(track: Track, seconds: Floats, piece: Ints, time: Floats) -> Floats:

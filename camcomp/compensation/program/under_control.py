@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -56,14 +57,26 @@ def control_warnings(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class UnderControl:
-    """Execution times and contour errors of a program under its controller."""
+    """Execution times and contour errors of a program under its controller, planned when they are asked for."""
 
-    before_s: float
+    programmed: ToolMoves
+    written: ToolMoves
+    limits: ControlLimits
+    tolerance_mm: float
     modes: tuple[PathMode, ...]  # of the cuts, in the order in which they come
     points: PointsOnMoves  # (k,) those of `after`
-    account: ControlAccount  # of the written moves
     rest: Bools  # (N,) end points at which the control rests because of a joining line
     apart: bool = False  # lines are kept from being made one
+
+    @cached_property
+    def account(self) -> ControlAccount:
+        """The account of the written moves."""
+        return ControlAccount.of(self.written, self.limits, self.tolerance_mm, self.points)
+
+    @cached_property
+    def before_s(self) -> float:
+        """Execution time of the program."""
+        return ControlAccount.of(self.programmed, self.limits).seconds
 
     @property
     def error(self) -> Floats:
@@ -189,8 +202,7 @@ def under_control(
     told, missed (k, 3) mm: written program and its tip errors at the points. rest, apart (N,): forced stops, unmerged lines.
     tolerance_um: beyond which the controller is warned of.
     """
-    path, limits = program.path, limits_of(job.config)
-    before = ControlAccount.of(programmed_moves(program, job), limits)
+    path = program.path
     moves = written_moves(program, job, rows, written, rest)
     if apart is not None:
         moves = replace(moves, merge=np.where(apart, 0.0, moves.merge))
@@ -203,8 +215,9 @@ def under_control(
     )  # fmt: skip
     cuts = np.flatnonzero((path.kind != RAPID) & ~path.machine)
     return UnderControl(
-        before_s=before.seconds, modes=distinct(program.modes[k] for k in cuts), points=on_moves,
-        account=ControlAccount.of(moves, limits, 1e-3 * tolerance_um, on_moves), rest=rest, apart=apart is not None,
+        programmed=programmed_moves(program, job), written=moves, limits=limits_of(job.config),
+        tolerance_mm=1e-3 * tolerance_um, modes=distinct(program.modes[k] for k in cuts), points=on_moves, rest=rest,
+        apart=apart is not None,
     )  # fmt: skip
 
 

@@ -86,6 +86,7 @@ class Track:
     beside1: Floats  # fraction of the motion before its end at which its direction is taken
     load: PieceLoad | None = None  # if the stock is known
     engaged: Engaged | None = None  # if the stock is known
+    began_min: float = 0.0  # minutes that the program takes before this path, when it is a part of one
 
     @property
     def angle(self) -> Floats:

@@ -332,3 +332,25 @@ def test_a_control_with_four_decimals_of_an_inch(orthoglide):
     assert_same(orthoglide, text, 8.0)
     assert re.search(r"X\d\.\d{4} ", ours) and not re.search(r"[XYZ]-?\d*\.\d{5}", ours)
     assert not re.search(r"F\d+(?![.\d])", ours)
+
+
+EFFECTS = """
+effects:
+  - {effect: joint_offset, target: x, offset_mm: 0.02}
+  - {effect: thermal_growth, target: y, growth_mm_per_K: 0.004, warm_up_s: 60}
+"""
+
+
+def test_effects_that_depend_on_time_go_on_from_piece_to_piece(tmp_path, monkeypatch):
+    (tmp_path / "effects.yaml").write_text(EFFECTS)
+    job = Job(load_config([shipped("config/orthoglide-1deg.yaml"), tmp_path / "effects.yaml"]))
+    text = "\n".join(groove(900)).encode()
+    monkeypatch.setattr(runs, "RUN", 300)
+    written = []
+    pieces = LongProgram(job=job, name="p.nc", setup=setup_of(job.config), tolerance_um=1.0, version="1")
+    figures = pieces.run(io.BytesIO(text), written.append).summary()
+    whole = compensate(program_of(text, "p.nc", job.config), job, method="newton", tolerance_um=1.0, version="1")
+    words = re.compile(rb"[XYZ](-?\d+\.\d+)")
+    mine, theirs = (np.array(words.findall(each), float) for each in (b"".join(written), whole.written.data))
+    assert len(mine) == len(theirs) and np.abs(mine - theirs).max() < 1.5e-4, "the last of four decimals"
+    assert sum("warming up" in each for each in figures.warnings) == 1
