@@ -1,11 +1,12 @@
 """How sure is a cause where something unmodelled may act, instead of it or jointly with it?
 
-Hypotheses h: nothing unmodelled, functions of one covariate at one scale, or a smooth process over the time of every run.
+Hypotheses h: nothing unmodelled, functions of one covariate at one scale, or a process over the time of every run, smooth or
+with jumps.
 With S the parts of a set of causes,
 
     P(cause i) = sum_(S has i, h) p(S, h) / sum_(S, h) p(S, h),      log p(S, h) = log evidence(S, h) / T + log prior(S, h)
 
-A cause has to be sure beside either kind of discrepancy: its probability is the lower one of both. A covariate whose functions
+A cause has to be sure beside every kind of discrepancy: its probability is the lowest one. A covariate whose functions
 do the same as the cause, within MODELLED of its size, is the cause under another name.
 
 Sources: Hoeting et al., Statistical Science 14 (1999) 382; Kennedy, O'Hagan, J. R. Statist. Soc. B 63 (2001) 425.
@@ -23,7 +24,7 @@ from scipy.special import logsumexp
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.discrepancy import UNKNOWN, gains_at_scales
 from camcomp.diagnosis.model.noise import MINOR
-from camcomp.diagnosis.search.unknown import joint_products, smooth_in_time
+from camcomp.diagnosis.search.unknown import joint_products, process_in_time
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, parts_of
 from camcomp.diagnosis.statistics.evidence import Gram, base, holding_back, log_bayes
 from camcomp.diagnosis.statistics.probability import TEMPERATURE
@@ -49,14 +50,9 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool) -> Credibility:
     weight = _weights(problem)
     joint = joint_products(problem, f, weight)
     alone = _alone(problem, f, joint.data, log(1.0 - UNKNOWN))
-    covariate, scales = _with_covariates(problem, f, joint, alone), smooth_in_time(problem, f, weight)
-    prior = log(UNKNOWN) - log(max(len(scales), 1))
-    smooth = [
-        replace(each, evidence=each.evidence - log_size, unmodelled=True)
-        for data, log_size in scales
-        for each in _alone(problem, f, data, prior)
-    ]
-    each_kind = [_present_and_replaced([*kind, *(() if surely else alone)]) for kind in (covariate, smooth) if kind]
+    kinds = [_with_covariates(problem, f, joint, alone)]
+    kinds += [_with_process(problem, f, process_in_time(problem, f, weight, power)) for power in (2.0, 1.0)]
+    each_kind = [_present_and_replaced([*kind, *(() if surely else alone)]) for kind in kinds if kind]
     present, replaced = np.min([p for p, _ in each_kind], axis=0), np.max([r for _, r in each_kind], axis=0)
     return Credibility(
         dict(zip(members, present.tolist(), strict=True)), dict(zip(members, replaced.tolist(), strict=True))
@@ -91,6 +87,16 @@ def _alone(problem: Problem, f: Fitted, data: Gram, prior: float) -> list[_Hypot
         there = tuple(float(i in some) for i in f.members)
         out.append(_Hypothesis(value, problem.candidates.prior(some) + prior, there))
     return out
+
+
+def _with_process(problem: Problem, f: Fitted, scales: Sequence[tuple[Gram, float]]) -> list[_Hypothesis]:
+    """Every part of a set jointly with a process, by normal equations and log of its size at every scale."""
+    prior = log(UNKNOWN) - log(max(len(scales), 1))
+    return [
+        replace(each, evidence=each.evidence - log_size, unmodelled=True)
+        for data, log_size in scales
+        for each in _alone(problem, f, data, prior)
+    ]
 
 
 def _with_covariates(

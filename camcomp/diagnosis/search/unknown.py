@@ -10,7 +10,6 @@ from scipy.linalg import eigh
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SCALES
-from camcomp.diagnosis.model.group import SmoothProcess
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate
@@ -40,9 +39,14 @@ def joint_products(problem: Problem, f: Fitted, weight: Sequence[Sequence[float]
     )
 
 
-def smooth_in_time(problem: Problem, f: Fitted, weight: Sequence[Sequence[float]]) -> list[tuple[Gram, float]]:
-    """Normal equations about a fit with a smooth process over the time of every run in the first kind of channel, and the log
-    of its size, at every scale of model/discrepancy; weight: of a row, per run and kind.
+def process_in_time(
+    problem: Problem, f: Fitted, weight: Sequence[Sequence[float]], power: float
+) -> list[tuple[Gram, float]]:
+    """Normal equations about a fit with a process over the time of every run in the first kind of channel, and the log of its
+    size, at every scale of model/discrepancy.
+
+    weight: of a row, per run and kind. power: of the distance in the logarithm of the correlation, 2 of a smooth process, 1 of one
+    with jumps from row to row.
     """
     k, scales, rows = len(problem.columns.names), len(LENGTHS["time"]) * len(SCALES), 0.0
     A, log_size = np.zeros((scales, k + 1, k + 1)), np.zeros(scales)
@@ -55,14 +59,16 @@ def smooth_in_time(problem: Problem, f: Fitted, weight: Sequence[Sequence[float]
             if first:
                 A += size**2 * (own.T @ own)
             else:
-                _add_smooth(A, log_size, [(on, size * X) for on, X in own.parts if len(X)], at)
+                _add_process(A, log_size, [(on, size * X) for on, X in own.parts if len(X)], at, power)
     return [
         (Gram(each[:k, :k], each[:k, k], float(each[k, k]), round(rows)), float(log))
         for each, log in zip(A, log_size, strict=True)
     ]
 
 
-def _add_smooth(A: Floats, log_size: Floats, channels: Sequence[tuple[Ints, Floats]], places: Floats) -> None:
+def _add_process(
+    A: Floats, log_size: Floats, channels: Sequence[tuple[Ints, Floats]], places: Floats, power: float
+) -> None:
     """Add products (scales, k, k) of white rows, channel behind channel at places (w,), with the process at every scale."""
     known: dict[bytes, list[tuple[Floats, Floats]]] = {}  # channels are mostly read at the same places
     first = 0
@@ -71,7 +77,7 @@ def _add_smooth(A: Floats, log_size: Floats, channels: Sequence[tuple[Ints, Floa
         for region in np.array_split(np.arange(len(X)), -(-len(X) // ROWS_OF_PROCESS)):
             key = place[region].tobytes()
             known[key] = known.get(key) or [
-                eigh(SmoothProcess(1.0, length, "time").correlation(place[region][:, None]))
+                eigh(np.exp(-((np.abs(np.subtract.outer(place[region], place[region])) / length) ** power) / power))
                 for length in LENGTHS["time"]
             ]
             for i, (spread, way) in enumerate(known[key]):

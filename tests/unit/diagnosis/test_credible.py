@@ -72,3 +72,9 @@ def test_a_shift_for_a_while_where_a_run_wanders_all_the_time_is_the_wandering(m
 def test_a_shift_for_a_while_that_begins_and_ends_at_once_stays(monkeypatch):
     sure, _ = present(monkeypatch, shift(0.3, 0.5), 2.0 * shift(0.3, 0.5) + noise(5))
     assert sure > 0.95
+
+
+def test_a_shift_for_a_while_where_a_run_jumps_from_row_to_row_is_some_of_the_jumps(monkeypatch):
+    walk = np.cumsum(np.random.default_rng(3).normal(0.0, 0.5, ROWS))[np.argsort(np.argsort(TIME))]
+    sure, replaced = present(monkeypatch, shift(0.15, 0.27), walk - walk.mean() + noise(6))
+    assert sure < 0.5 and replaced > 0.5
