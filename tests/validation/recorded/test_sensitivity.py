@@ -8,7 +8,7 @@ from tests.validation.recorded import sensitivity
 @pytest.mark.campaign  # asks whole experiments again and again
 def test_a_constant_that_decides_is_told_from_one_that_does_not_and_from_one_that_is_not_met(tmp_path, monkeypatch):
     gate, listed, milled = (
-        ("axis.block_least_squares", "LEAST_Z"),
+        ("model.noise", "MINOR"),
         ("axis.plausible", "NEAR"),
         ("search.cause_search", "LEFT_OPEN"),
     )
