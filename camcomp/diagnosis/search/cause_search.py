@@ -119,9 +119,9 @@ def _keep_causes(problem: Problem, best: Fitted, sets: FittedSets) -> _Kept:
     while True:
         kept = foretelling(problem, f) if kind else f.members
         if kept == f.members:
-            found = credibility(problem, f, surely=kind is not None)
-            most = max(found.replaced, key=lambda i: found.replaced[i], default=None)
-            if most is None or found.replaced[most] < EVEN:
+            present, replaced = credibility(problem, f, surely=kind is not None)
+            most = max(replaced, key=replaced.__getitem__, default=None)
+            if most is None or replaced[most] < EVEN:
                 break
             instead = instead or problem.moved_um(f, (most,)) > _least(problem, _modelled(problem, f))
             kept = tuple(i for i in f.members if i != most)
@@ -132,7 +132,7 @@ def _keep_causes(problem: Problem, best: Fitted, sets: FittedSets) -> _Kept:
         return _Kept(sets.null, {}, beyond, None, False)
     if kind is None and (at_first or instead):
         kind = worst(beyond).kind
-    return _Kept(f, found.present, beyond, kind, bool(above_floor(problem, beyond)))
+    return _Kept(f, present, beyond, kind, bool(above_floor(problem, beyond)))
 
 
 def _with_answer(problem: Problem, sets: RankedSets, known: Fitted) -> RankedSets:

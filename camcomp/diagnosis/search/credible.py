@@ -14,7 +14,7 @@ Sources: Hoeting et al., Statistical Science 14 (1999) 382; Kennedy, O'Hagan, J.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import log
 
@@ -34,19 +34,14 @@ from camcomp.ground.datatypes import Floats, Ints
 MODELLED = 0.1  # of what causes explain: none is modelled better than that
 
 
-@dataclass(frozen=True, eq=False)
-class Credibility:
-    """Of every member of a set: its probability, and that of something unmodelled in its place."""
+def credibility(problem: Problem, f: Fitted, *, surely: bool) -> tuple[dict[int, float], dict[int, float]]:
+    """Of every member of f: its probability, and that of something unmodelled in its place.
 
-    present: Mapping[int, float]
-    replaced: Mapping[int, float]
-
-
-def credibility(problem: Problem, f: Fitted, *, surely: bool) -> Credibility:
-    """How sure the members of f are; surely: whether something unmodelled acts for certain."""
+    surely: whether something unmodelled acts for certain.
+    """
     members = f.members
     if not members:
-        return Credibility({}, {})
+        return {}, {}
     weight = _weights(problem)
     joint = joint_products(problem, f, weight)
     alone = _alone(problem, f, joint.data, log(1.0 - UNKNOWN))
@@ -54,9 +49,7 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool) -> Credibility:
     kinds += [_with_process(problem, f, process_in_time(problem, f, weight, power)) for power in (2.0, 1.0)]
     each_kind = [_present_and_replaced([*kind, *(() if surely else alone)]) for kind in kinds if kind]
     present, replaced = np.min([p for p, _ in each_kind], axis=0), np.max([r for _, r in each_kind], axis=0)
-    return Credibility(
-        dict(zip(members, present.tolist(), strict=True)), dict(zip(members, replaced.tolist(), strict=True))
-    )
+    return dict(zip(members, present.tolist(), strict=True)), dict(zip(members, replaced.tolist(), strict=True))
 
 
 def _present_and_replaced(found: Sequence[_Hypothesis]) -> tuple[Floats, Floats]:

@@ -81,10 +81,6 @@ class FittedSets:
             progress.done(len(self.done) / (SINGLES + 2 * TRIED))
         return self.done[members]
 
-    def value(self, f: Fitted) -> float:
-        """Log posterior of a fit up to a constant."""
-        return self.problem.candidates.value(f)
-
     def search_near(self, near: Fitted) -> None:
         """Fit the best sets by the evidence linearised about a fit; about none, the best single causes, too."""
         self.searched.add(near.members)
@@ -96,7 +92,7 @@ class FittedSets:
         larger = {members for members in found if len(members) > len(near.members)}
         for some in (larger, found.keys() - larger - self.done.keys()):
             first = sorted(some, key=lambda members: (-found[members], members))[: 3 * TRIED]
-            best = self.value(near)
+            best = problem.candidates.value(near)
             for value, members in scored(scale, first)[:TRIED]:
                 best = max(best, value)
                 if value > best - HOPELESS_LOG:

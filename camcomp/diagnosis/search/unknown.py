@@ -26,7 +26,7 @@ SURE_SD = 3.0  # of the floor: what noise leaves of a row
 def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, ResidualTest]:
     """Score test on the residual of a set, per kind of channel; prior: of all other columns."""
     joint = joint_products(problem, f)
-    return score_test(joint, *joint.projected(prior, problem.member_columns(f.members)), rows_by_kind(problem))
+    return score_test(joint, *joint.projected(prior, problem.member_columns(f.members)))
 
 
 def joint_products(problem: Problem, f: Fitted, weight: Sequence[Sequence[float]] | None = None) -> JointProducts:
@@ -98,12 +98,6 @@ def about(problem: Problem, f: Fitted) -> tuple[list[ByChannel], list[Floats]]:
 def firm_prior(problem: Problem) -> Prior:
     """The prior to describe an unknown effect with: everything else is as stated, and no tolerance stretches to follow it."""
     return replace(problem.prior, tolerance=1e-3 * problem.prior.tolerance)
-
-
-def rows_by_kind(problem: Problem) -> dict[str, int]:
-    """White rows of all runs, per kind of channel."""
-    counts = zip(*([len(part) for part in parts] for parts in problem.white_patterns), strict=True)
-    return {words.kind: sum(each) for words, each in zip(problem.dictionaries, counts, strict=True)}
 
 
 def foretelling(problem: Problem, f: Fitted) -> Members:

@@ -6,7 +6,7 @@ with what chance makes of it (Rao's score test), and their evidence at a scale i
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,19 +19,13 @@ from camcomp.ground.datatypes import Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class ResidualTest:
-    """Patterns of one kind of channel: rms beyond chance in units of the kind's noise, number of rows, and covariates with
-    the share of it that each carries alone, largest first.
+    """Patterns of one kind of channel: energy beyond chance in units of the kind's noise, and covariates with the share of it
+    that each carries alone, largest first.
     """
 
     kind: str
-    rms: float
-    rows: int
+    energy: float
     labels: tuple[tuple[str, float], ...]
-
-    @property
-    def energy(self) -> float:
-        """Of all rows, in units of the noise."""
-        return self.rms**2 * self.rows
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -91,14 +85,14 @@ class JointProducts:
         return self.P - half[:, :-1].T @ half[:, :-1], self.h - half[:, :-1].T @ half[:, -1]
 
 
-def score_test(joint: JointProducts, P: Floats, h: Floats, rows: Mapping[str, int]) -> dict[str, ResidualTest]:
-    """Size of the patterns of every kind against chance; P (p, p), h (p,): projected; rows: white rows per kind."""
+def score_test(joint: JointProducts, P: Floats, h: Floats) -> dict[str, ResidualTest]:
+    """Size of the patterns of every kind against chance; P (p, p), h (p,): projected."""
     out = {}
     for kind in dict.fromkeys(joint.kinds):
         mine = np.flatnonzero(np.array(joint.kinds) == kind)
         own, b = P[np.ix_(mine, mine)], h[mine]
-        rms = float(np.sqrt(_explained(own, b, np.arange(len(mine))) / rows[kind]))
-        out[kind] = ResidualTest(kind, rms, rows[kind], _shares(own, b, [joint.labels[i] for i in mine]))
+        energy = _explained(own, b, np.arange(len(mine)))
+        out[kind] = ResidualTest(kind, energy, _shares(own, b, [joint.labels[i] for i in mine]))
     return out
 
 

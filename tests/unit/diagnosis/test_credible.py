@@ -30,8 +30,8 @@ def present(monkeypatch, column, left, *, surely=False):
     f = Fitted(
         members=(0,), theta=np.array([amount]), covariance=np.eye(1), log_evidence=0.0, grams=(), residual=(left,)
     )
-    found = credible.credibility(problem, f, surely=surely)
-    return found.present[0], found.replaced[0]
+    there, replaced = credible.credibility(problem, f, surely=surely)
+    return there[0], replaced[0]
 
 
 def noise(seed):
