@@ -101,13 +101,13 @@ def write_rows(*args: Any) -> int:
 
 @entry
 def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed, code_stated, feed_stated, program_feed,
-                first, joining, rest, begins, at_rest, on, wanted, feed, position, state, unit, offset, digits, half, feed_point, out, written, held, value, goes, fresh):  # fmt: skip
+                first, joining, rest, begins, at_rest, on, commanded, feed, position, state, unit, offset, digits, half, feed_point, out, written, held, value, goes, fresh):  # fmt: skip
     """The bytes text_at..text_end of `data`, which hold n motions, with N rows in their place.
 
     lines (n, 3), begin and finish (n, 5), kind (n,), programmed (n, 3) mm, program_feed (n,): see
     linear_lines.LinearMotions.
     first (n + 1,): rows of every motion. joining (N,), rest (N,): ends at rest; at_rest, on: bytes of the
-    lines in front of such rows and of the next that is none (begins -1: of the first in any case, else 0), wanted (N, 3) mm, feed (N,) mm/min (NaN: as programmed).
+    lines in front of such rows and of the next that is none (begins -1: of the first in any case, else 0), commanded (N, 3) mm, feed (N,) mm/min (NaN: as programmed).
     position (3,) mm and state (2,) = motion code in force (-1 unknown), feed in force (NaN unknown):
     carried on. feed_point: whole feeds have a point. Fills out (bytes), written (N, 3) mm, held (N,): feed in force
     behind the row, mm/min. Returns the number of bytes. value, goes, fresh (3,): room to work in.
@@ -149,7 +149,7 @@ def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed,
         code = 0.0 if kind[i] == RAPID else 1.0
         for row in range(first[i], first[i + 1]):
             new = row != main
-            target = wanted[row]
+            target = commanded[row]
             for k in range(3):
                 stays = position[k]
                 if not new and begin[i, k] >= 0:
