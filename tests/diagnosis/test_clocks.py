@@ -36,7 +36,7 @@ def named(result):
 @pytest.mark.parametrize(
     ("late_ms", "labels", "rapids", "causes"),
     [
-        ((-6.0, 4.0, 9.0, -3.0), "abcd", False, []),
+        pytest.param((-6.0, 4.0, 9.0, -3.0), "abcd", False, [], marks=pytest.mark.campaign),
         pytest.param((12.0, 0.0, 0.0, 0.0), ("other", None, None, None), True, [], marks=pytest.mark.campaign),
         pytest.param((5.0, 5.0, 5.2, 5.2), "aabb", True, [("time_sync", None)], marks=pytest.mark.campaign),
         # all that an unknown function of velocity would do here is what a late clock does

@@ -169,7 +169,10 @@ def damaged_compiled_code(rng, project):
 
 
 def no_home_and_no_place(rng, project):
-    """A service user in a container: nothing may be written, there is no home."""
+    """A service user in a container: nothing may be written, there is no home.
+
+    One note says why the named folder is not used, another that no folder is left.
+    """
     folder = project.fresh()
     package = folder.with_name(folder.name + ".package")
     shutil.copytree(ROOT / "camcomp", package / "camcomp", ignore=shutil.ignore_patterns("__pycache__"))
@@ -177,7 +180,7 @@ def no_home_and_no_place(rng, project):
     for each in [each for each in package.rglob("*") if each.is_dir()]:
         (each / "__pycache__").write_bytes(b"")  # nobody can make a folder of this name
     verdict = _with_code(
-        project, folder, "/dev/null/none", notes=1, PYTHONPATH=str(package), HOME="/dev/null", XDG_CACHE_HOME=""
+        project, folder, "/dev/null/none", notes=2, PYTHONPATH=str(package), HOME="/dev/null", XDG_CACHE_HOME=""
     )
     shutil.rmtree(package)
     return verdict

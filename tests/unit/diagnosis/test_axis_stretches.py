@@ -26,7 +26,7 @@ def test_rows_in_which_a_push_comes_and_goes_do_not_lower_it():
     assert abs(window.first - 1500) <= 1 and abs(window.last - 2000) <= 1
 
 
-@pytest.mark.parametrize("begin", [4000, 4020])
+@pytest.mark.parametrize("begin", [4000, pytest.param(4020, marks=pytest.mark.campaign)])
 def test_a_push_that_begins_among_lost_rows_is_not_known_to_better(begin):
     rng = np.random.default_rng(begin)
     time = 1e-3 * np.arange(16000)

@@ -50,7 +50,7 @@ def deadly(task):
     return pools.Outcome(key=task.key, exit_code=0)
 
 
-@pytest.mark.parametrize("always", ["", "key-5"])
+@pytest.mark.parametrize("always", ["", pytest.param("key-5", marks=pytest.mark.campaign)])
 def test_a_worker_killed_on_this_machine_loses_nothing(monkeypatch, tmp_path, always):
     monkeypatch.setenv("CAMCOMP_TEST_MARK", str(tmp_path / "died"))
     monkeypatch.setenv("CAMCOMP_TEST_ALWAYS", always)
