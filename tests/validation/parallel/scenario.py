@@ -68,9 +68,9 @@ def rms(values: np.ndarray) -> float:
 
 def runs(rng: np.random.Generator, machine: Machine, warming: dict) -> list[Track]:
     """3 to 6 runs on different recordings, most with circles, a quarter in the air, minutes apart."""
-    count = int(rng.integers(3, 7))
     circles = ["circles-exact", "circles-blended"]
     others = [name for name in recording.names() if name not in circles]
+    count = min(int(rng.integers(3, 7)), len(others))
     chosen = list(rng.permutation(others)[:count])
     if rng.random() < 0.75:
         chosen[0] = str(rng.choice(circles))
