@@ -101,7 +101,7 @@ def page(name: str, results: list[Result]) -> str:
         more += f"\n## Over codes\n\n![rates over codes]({name.replace('_', '-')}.svg)\n"
     return PAGE.format(
         title=generator.title, about=generator.about, experiments=newest["experiments"], first=newest["first_seed"],
-        last=newest["next_seed"] - 1, next=newest["next_seed"], commit=newest["commit"], date=newest["date"], name=name,
+        last=newest["next_seed"] - 1, next=newest["next_seed"], commit=newest["commit"], date=newest["date"][:10], name=name,
         rows="\n".join(rows), more=more,
     )  # fmt: skip
 
@@ -174,7 +174,7 @@ def measured(result: Result) -> str:
             f"| {row['answer']}{causes} |"
         )
     return MEASURED.format(
-        commit=result["commit"], date=result["date"], summary=_summary(result) + ".", rows="\n".join(rows)
+        commit=result["commit"], date=result["date"][:10], summary=_summary(result) + ".", rows="\n".join(rows)
     )
 
 

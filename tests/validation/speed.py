@@ -72,7 +72,10 @@ def page(result: dict[str, Any]) -> str:
         for each in result["rows"]
     ]
     return PAGE.format(
-        commit=result["commit"], date=result["date"], rows="\n".join(rows), most=f"{READ_WHOLE:,}".replace(",", " ")
+        commit=result["commit"],
+        date=result["date"][:10],
+        rows="\n".join(rows),
+        most=f"{READ_WHOLE:,}".replace(",", " "),
     )
 
 

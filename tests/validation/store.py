@@ -17,7 +17,7 @@ Result = dict[str, Any]
 
 @dataclass(frozen=True)
 class Code:
-    """The code that is judged: the last commit that changed it, and its date; `tree` names the content of camcomp, whatever the commit is called."""
+    """The code that is judged: the last commit that changed it, and its minute; `tree` names the content of camcomp, whatever the commit is called."""
 
     commit: str
     date: str
@@ -31,7 +31,9 @@ def _git(*words: str) -> str:
 def code() -> Code:
     """The code of this checkout; changes of camcomp that are not committed are marked by a plus sign."""
     changed = "+" if _git("status", "--porcelain", "--", "camcomp", "config") else ""
-    commit, date = _git("log", "-1", "--format=%h %cs", "--abbrev=10", "--", "camcomp", "config").split()
+    commit, date = _git(
+        "log", "-1", "--format=%h %cd", "--date=format:%Y-%m-%dT%H:%M", "--abbrev=10", "--", "camcomp", "config"
+    ).split()
     return Code(commit + changed, date, _git("rev-parse", "--short=10", "HEAD:camcomp") + changed)
 
 
@@ -61,7 +63,7 @@ def opened(generator: str, first_seed: int | None) -> Result:
 
 def save(result: Result) -> None:
     """Write a result whole."""
-    path = RESULTS / result["generator"] / f"{result['date']}-{result['tree'].replace('+', '-changed')}.json"
+    path = RESULTS / result["generator"] / f"{result['date'][:10]}-{result['tree'].replace('+', '-changed')}.json"
     path.parent.mkdir(parents=True, exist_ok=True)
     text = path.with_suffix(".tmp")
     text.write_text(json.dumps(result, indent=1) + "\n")
