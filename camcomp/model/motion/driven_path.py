@@ -39,7 +39,7 @@ _CREEPS = 0.05  # of the cutting speed: a slower mean speed over missing rows me
 _SAME_FEED = 0.03  # relative tolerance of driven against programmed feed
 LEAST_FEED = 1e-3  # mm/min, in place of zero
 _RESTS = 1e-3  # of the longest step between two rows: two shorter steps in succession are a standstill
-_STEEP = np.cos(0.2)  # cosine of the angle to the tool axis below which a motion has no direction across it
+_STEEP = np.cos(0.2)  # of the angle to the tool axis within which a log does not tell the direction across it
 _CHORD_MM = 0.02  # length over which a direction is taken: large against digits and noise of set-points
 
 
