@@ -85,16 +85,12 @@ def of_axes(found: Sequence[AxisFindings], revolute: Mapping[str, bool]) -> Colu
 
 def _lay(cells: dict[tuple[str, float], dict[str, float]], channel: AxisChannel, name: str, factor: float) -> None:
     """Add gap and residual of every row of one channel's fitted and held-out runs to the cells."""
-    middle = float(np.mean(np.concatenate([values for _, values in channel.whole])))
-    parts = [
-        (k, times, values - middle, move.time, rest)
-        for k, (times, values), move, rest in zip(channel.runs, channel.whole, channel.moves, channel.left, strict=True)
-    ]
-    parts += [(k, at, channel.held_whole[k], at, channel.held[k]) for k, at in channel.held_times.items()]
-    for k, times, gap, rest_times, rest in parts:
-        for column, at, each in ((f"gap_{name}", times, gap), (f"rest_{name}", rest_times, rest)):
+    middle = float(np.mean(channel.rows))
+    for r in channel.runs:
+        times, gap = (r.whole[0], r.whole[1] - middle) if r.fitted else (r.move.time, r.gap)
+        for column, at, each in ((f"gap_{name}", times, gap), (f"rest_{name}", r.move.time, r.left)):
             for time, value in zip(at.tolist(), each.tolist(), strict=True):
-                cells.setdefault((channel.all_names[k], time), {})[column] = factor * value
+                cells.setdefault((r.name, time), {})[column] = factor * value
 
 
 def _both(names: Sequence[str], gap: Floats, rest: Floats) -> Columns:

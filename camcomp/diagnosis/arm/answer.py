@@ -17,12 +17,11 @@ from camcomp.diagnosis.arm.linear import covariate_of
 from camcomp.diagnosis.arm.next_poses import POSES_SEED, proposed, unseen_share
 from camcomp.diagnosis.arm.noise_floor import TipFloor
 from camcomp.diagnosis.arm.poses import CURVE
-from camcomp.diagnosis.arm.unseen import HeldOutCheck
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.classes import alternatives_of
 from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
 from camcomp.diagnosis.model.evidence import Background
-from camcomp.diagnosis.model.folds import without_nuisances
+from camcomp.diagnosis.model.folds import Excess, without_nuisances
 from camcomp.diagnosis.model.group import split_regions
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.model.verdict import VerdictInputs, decide
@@ -59,10 +58,10 @@ POSES_MAP, UNKNOWN_MAP = "poses", "poses beside unknown"  # kinds of log of the 
 
 @dataclass(frozen=True, eq=False)
 class AnswerInputs:
-    """Inputs of an answer; gaps (n, 3) mm of the fitted campaigns to the arm of the config."""
+    """Inputs of an answer; check: of held-out poses; gaps (n, 3) mm of the fitted campaigns to the arm of the config."""
 
     case: PoseCase
-    check: HeldOutCheck
+    check: Excess | None
     gaps: Sequence[Floats]
 
     @property
@@ -73,7 +72,7 @@ class AnswerInputs:
     @property
     def unmodelled(self) -> float:
         """Calibrated probability that something unmodelled acts; unseen poses above their floor decide."""
-        if self.check.above:
+        if self.check is not None and self.check.above:
             return calibration_of(POSES_MAP).calibrate(1.0)
         return calibration_of(POSES_MAP).calibrate(self.case.explanation.unknown)
 
@@ -222,7 +221,7 @@ def verdict(told: AnswerInputs, named: Sequence[FoundCause]) -> Any:
         alternatives=len(told.alternatives()) - 1,
         causes=len(named),
         known_noise=told.floor is not None,
-        confirmed=told.check.at_floor,
+        confirmed=None if told.check is None else told.check.at_floor,
     )
     return decide(inputs)
 

@@ -7,66 +7,35 @@ A withheld campaign with the clamping of a fitted one has its frames; one with a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from camcomp.diagnosis.answer.unseen import PARTS, JudgedRun, unseen_shrinkage
 from camcomp.diagnosis.arm.case import PoseCase, named_rows
 from camcomp.diagnosis.arm.curves import covered, seen_angles
 from camcomp.diagnosis.arm.noise_floor import far_off
 from camcomp.diagnosis.arm.poses import CURVE, ArmBench
 from camcomp.diagnosis.model.evidence import Background
-from camcomp.diagnosis.model.folds import ABOVE, Excess, HeldOut, excess_of, folds_of, held_out, without_nuisances
+from camcomp.diagnosis.model.folds import Excess, excess_of, folds_of, held_out, without_nuisances
 from camcomp.diagnosis.model.group import split_regions
-from camcomp.diagnosis.model.noise import AT_FLOOR
 from camcomp.diagnosis.model.search import MOST, search_sets
-from camcomp.diagnosis.result.types import FoundCause, ShrinkageStep, UnknownCause, UnseenShrinkage
-from camcomp.diagnosis.statistics.shrinkage import log_ratio, of_one_more, scatter
+from camcomp.diagnosis.result.types import FoundCause, UnknownCause, UnseenShrinkage
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 
-SURELY, LIKELY = 2.33, 1.64  # standard errors: 99 % and 95 %, one side
 FAR_FRAME = 5.0  # contract: floors from which on withheld poses in fitted frames are warned of
-REGIONS = 16  # of postures of a campaign
-REGIONS_OF_ONE = 4  # that a campaign visits, at least: it differs from the next one by as much as means of these
 
 
-@dataclass(frozen=True, eq=False)
-class HeldOutCheck:
-    """Residuals of held-out campaigns with the fitted causes; parts: per campaign or region.
-
-    excess None: all campaigns are fitted.
-    """
-
-    parts: tuple[HeldOut, ...]
-    excess: Excess | None
-
-    @property
-    def above(self) -> bool:
-        """Whether unseen poses keep more than the floor."""
-        return self.excess is not None and self.excess.mean - SURELY * self.excess.error > ABOVE
-
-    @property
-    def at_floor(self) -> bool | None:
-        """Whether held-out poses are at the floor; None where all campaigns are fitted."""
-        if self.excess is None:
-            return None
-        return self.excess.mean + LIKELY * self.excess.error < AT_FLOOR
-
-
-def check_held_out(case: PoseCase) -> HeldOutCheck:
-    """Residuals of held-out campaigns with the causes, under the noise of the floor alone."""
+def check_held_out(case: PoseCase) -> Excess | None:
+    """Excess of held-out campaigns with the causes, under the noise of the floor alone; None without either of them."""
+    if len(case.bench.campaigns) < 2 or case.floor is None:
+        return None
     found = case.explanation
-    if len(case.bench.campaigns) < 2:
-        return HeldOutCheck((), None)
-    noise = found.background.noise if case.floor is None else 1.0
-    parts, density = held_out(
-        case.model, Background(noise, families=found.background.families), found.members, folds_of(case.model)
-    )
-    if case.floor is None:
-        return HeldOutCheck(tuple(parts), None)
-    return HeldOutCheck(tuple(parts), excess_of(case.model, parts, density, case.floor.freedom))
+    background = Background(families=found.background.families)
+    parts = held_out(case.model, background, found.members, folds_of(case.model))
+    return excess_of(case.model, parts, case.floor.freedom)
 
 
 def without_far_judged(case: PoseCase) -> PoseCase:
@@ -132,29 +101,19 @@ def shrinkage(
         stages, order = left_out_in_turn(case)
     if not judged:
         return None
-    squares = [[(r**2).sum(axis=1) for r in each] for each in stages]
-    size = [float(np.sqrt(np.mean([s[i].mean() for s in squares]))) for i in range(len(order) + 1)]
-    ratio = 1.0 - size[-1] / size[0] if size[0] > 0.0 else 0.0
-    low, high = interval_of_next(squares, [bench.campaigns[k].features for k in judged])
-    share, rest = where_covered(case, named, judged, [s[-1] for s in squares])
+    runs = []
+    for k, each in zip(judged, stages, strict=True):
+        count = min(PARTS, max(len(each[0]) // 8, 2))
+        parts = split_regions(bench.campaigns[k].features, count)
+        runs.append(JudgedRun([(r**2).sum(axis=1) for r in each], parts))
+    share, rest = where_covered(case, named, judged, [r.squares[-1] for r in runs])
     refitted = [k for k in judged if bench.owner[k] == k]
     texts = [] if not refitted else ["frame of the instrument", "place of its target"]
     texts += [f"run {name} does not fix its frame: not judged" for name in case.loose]
-    return UnseenShrinkage(
-        holdout=tuple(names),
-        before_rms_um=round(1e3 * size[0], 3),
-        after_rms_um=round(1e3 * size[-1], 3),
-        ratio=round(ratio, 4),
-        ci95=(round(min(low, ratio), 4), round(max(high, ratio), 4)),
-        steps=tuple(
-            ShrinkageStep(effect=e, target=t, after_rms_um=round(1e3 * s, 3))
-            for (e, t), s in zip(order, size[1:], strict=True)
-        ),
-        noise_floor_um=None if case.floor is None else round(case.floor.um, 3),
-        refitted=tuple(texts),
-        covered_share=share,
-        covered_rms_um=rest,
-    )
+    return unseen_shrinkage(
+        runs, order, holdout=tuple(names), noise_floor_um=None if case.floor is None else round(case.floor.um, 3),
+        refitted=tuple(texts), covered_share=share, covered_rms_um=rest,
+    )  # fmt: skip
 
 
 def left_out_in_turn(case: PoseCase) -> tuple[list[list[Floats]], list[tuple[str, str | None]]]:
@@ -196,19 +155,3 @@ def where_covered(
     every = np.concatenate([left[mask] for left, mask in zip(after, inside, strict=True)])
     rest = round(1e3 * float(np.sqrt(every.mean())), 3) if len(every) else None
     return round(len(every) / sum(len(left) for left in after), 4), rest
-
-
-def interval_of_next(squares: Sequence[Sequence[Floats]], features: Sequence[Floats]) -> tuple[float, float]:
-    """95 % interval of the shrinkage of one more campaign, from squares (n,) of the campaigns at hand.
-
-    Logarithms of the ratio are taken as normal. They vary from campaign to campaign as they do between these, and as means
-    over REGIONS_OF_ONE regions of postures do. Student's t, the spread pooled over both.
-    """
-    each = np.array([log_ratio(float(s[0].mean()), float(s[-1].mean())) for s in squares])
-    square, freedom = scatter(each)
-    for s, f in zip(squares, features, strict=True):
-        group = split_regions(f, min(REGIONS, max(len(s[0]) // 8, 2)))
-        own = [log_ratio(float(s[0][group == g].mean()), float(s[-1][group == g].mean())) for g in np.unique(group)]
-        inside, regions_seen = scatter(np.array(own))
-        square, freedom = square + inside / REGIONS_OF_ONE, freedom + regions_seen
-    return of_one_more(float(each.mean()), square, freedom, 1.0 + 1.0 / len(each))

@@ -7,8 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from camcomp.diagnosis.answer.unseen import PARTS, JudgedRun, unseen_shrinkage
 from camcomp.diagnosis.axis.at_tip import TipMotion, held_errors, lever_mm, position_floor, whole_errors
-from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
+from camcomp.diagnosis.axis.findings import AxisFindings
 from camcomp.diagnosis.axis.gate import KNOWN
 from camcomp.diagnosis.result.types import (
     ActuatorGap,
@@ -19,31 +20,28 @@ from camcomp.diagnosis.result.types import (
     GapSize,
     IntervalShare,
     RippleDriver,
-    ShrinkageStep,
     UnknownCause,
     UnseenShrinkage,
     Where,
 )
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
-from camcomp.diagnosis.statistics.shrinkage import log_ratio, of_one_more, scatter
 from camcomp.ground.datatypes import Floats
 from camcomp.model.motion.log_columns import log_columns
 
 SAME_TIME_CONSTANT = 0.02  # of a time constant: by which those of axes may differ and be one
-STRETCHES_OF_ONE = 4  # that a run holds, at least; it differs from the next one by as much as means of these
 
 
 def unknown(axis: AxisFindings, whole: int) -> UnknownCause:
     """The unknown cause of an axis: its share of the gap, and its probability (even odds where no test shows it)."""
     shares = []
     for channel in axis.channels:
-        left, first = float(np.mean(channel.last)), max(float(np.mean(channel.first)), 1e-300)
+        first, left = channel.squares
         parts = [share for _, share in axis.unknown_in] if channel is axis.channels[-1] else []
         if axis.ripple and channel is axis.force:
             parts.append(axis.ripple.share)
         if channel.gate and channel.gate.word == "above":
             parts.append(max(1.0 - channel.floor**2 / max(left, 1e-300), 0.0))
-        shares.append(max(parts, default=0.0) * left / first)
+        shares.append(max(parts, default=0.0) * left / max(first, 1e-300))
     probability = stated(probability_of_chance(axis.unknown_chance)) if axis.strange else EVEN
     share = round(min(sum(shares) / whole, 1.0), 6)
     return UnknownCause(target=axis.name, probability=probability, share=share, law=axis.law)
@@ -53,7 +51,7 @@ def gap(found: Sequence[AxisFindings], tip: TipMotion) -> GapSize:
     """Size of the errors of position at the tip in um, and of every actuator in its own unit; where only forces were logged, of these in mN."""
     errors = whole_errors(found)
     if not errors:
-        rows = [np.concatenate([values for _, values in c.whole]) for a in found for c in a.channels[:1]]
+        rows = [c.rows for a in found for c in a.channels[:1]]
         size = np.abs(np.concatenate([each - np.mean(each) for each in rows]))
         floor = float(np.sqrt(np.mean([a.channels[0].floor ** 2 for a in found])))
     else:
@@ -93,7 +91,7 @@ def _rms(values: Floats) -> float:
 def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
     """Shares of axes; covariates of the residuals, and the intervals in which they exceed the floor."""
     known = [c for c in causes if not isinstance(c, UnknownCause)]
-    energy = {a.name: float(np.mean(c.first)) for a in found if (c := a.following or a.force) is not None}
+    energy = {a.name: c.squares[0] for a in found if (c := a.following or a.force) is not None}
     total = max(sum(energy.values()), 1e-300)
     drivers: list[Driver] = []
     for a in found:
@@ -126,7 +124,7 @@ def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
 
 def _intervals(found: Sequence[AxisFindings]) -> tuple[IntervalShare, ...]:
     every = [
-        IntervalShare(run=c.names[i.run], t0_s=round(i.t0, 6), t1_s=round(i.t1, 6), share=round(i.share, 4))
+        IntervalShare(run=c.runs[i.run].name, t0_s=round(i.t0, 6), t1_s=round(i.t1, 6), share=round(i.share, 4))
         for a in found
         for c in a.channels
         if c.gate is not None
@@ -136,37 +134,23 @@ def _intervals(found: Sequence[AxisFindings]) -> tuple[IntervalShare, ...]:
 
 
 def shrinkage(judged: Sequence[Sequence[AxisFindings]], names: Sequence[str], tip: TipMotion) -> UnseenShrinkage:
-    """On whole runs that took no part in choosing and fitting; the interval is that of one more run."""
-    main = [[a.channels[0] for a in found if a.channels] for found in judged]
-    before, after = (_unseen(judged, tip, explained=each) for each in (False, True))
-    if before is None or after is None:  # forces alone
-        runs = [(_mean_square(channels, "first"), _mean_square(channels, "last")) for channels in main]
-    else:
-        runs = [(float(np.mean(b**2)), float(np.mean(a**2))) for b, a in zip(before, after, strict=True)]
-    sizes = [float(np.sqrt(np.mean([r[i] for r in runs]))) for i in (0, 1)]
-    ratio = 1.0 - sizes[1] / sizes[0] if sizes[0] > 0 else 0.0
-    effects = dict.fromkeys((c.effect, c.target) for found in judged for a in found for c in a.causes)
-    low, high = _interval(main, runs)
-    return UnseenShrinkage(
-        holdout=tuple(names),
-        before_rms_um=round(1e3 * sizes[0], 3),
-        after_rms_um=round(1e3 * sizes[1], 3),
-        ratio=round(ratio, 4),
-        ci95=(round(min(low, ratio), 4), round(max(high, ratio), 4)),
-        steps=tuple(ShrinkageStep(effect=e, target=t, after_rms_um=round(1e3 * sizes[1], 3)) for e, t in effects),
-        actuators=_actuators_unseen(judged),
-    )
-
-
-def _unseen(judged: Sequence[Sequence[AxisFindings]], tip: TipMotion, *, explained: bool) -> list[Floats] | None:
-    """Distances (n,) mm of the tip per fit, on its withheld runs; None where the logs lack set-points."""
-    out = []
+    """On whole runs that took no part in choosing and fitting, one per fit."""
+    effects = list(dict.fromkeys((c.effect, c.target) for found in judged for a in found for c in a.causes))
+    runs = []
     for found in judged:
-        runs = held_errors(found, explained=explained)
-        if not runs:
-            return None
-        out.append(np.concatenate([tip.errors(run, each) for run, each in runs.items()]))
-    return out
+        before, after = (_unseen(found, tip, explained=each) for each in (False, True))
+        parts = np.arange(len(before)) * PARTS // len(before)
+        runs.append(JudgedRun([before, *[after] * max(len(effects), 1)], parts))
+    return unseen_shrinkage(runs, effects, holdout=tuple(names), actuators=_actuators_unseen(judged))
+
+
+def _unseen(found: Sequence[AxisFindings], tip: TipMotion, *, explained: bool) -> Floats:
+    """Squares (n,) of the distance of the tip, mm2, on withheld runs; of drive forces, N2, where the logs lack set-points."""
+    errors = held_errors(found, explained=explained)
+    if errors:
+        return np.concatenate([tip.errors(run, each) ** 2 for run, each in errors.items()])
+    runs = [r for a in found for c in a.channels[:1] for r in c.held]
+    return np.concatenate([(r.left if explained else r.gap) ** 2 for r in runs])
 
 
 def _actuators_unseen(judged: Sequence[Sequence[AxisFindings]]) -> dict[str, ActuatorShrinkage]:
@@ -174,39 +158,22 @@ def _actuators_unseen(judged: Sequence[Sequence[AxisFindings]]) -> dict[str, Act
     out = {}
     for name in dict.fromkeys(a.name for found in judged for a in found if a.following is not None):
         axes = [a for found in judged for a in found if a.name == name and a.following is not None]
+        held = [r for a in axes if a.following for r in a.following.held]
         parts = [
-            np.concatenate(
-                [values for a in axes if a.following for values in getattr(a.following, each).values()] or [np.zeros(1)]
-            )
-            for each in ("held_whole", "held")
+            np.concatenate([np.zeros(0 if held else 1), *each])
+            for each in ([r.gap for r in held], [r.left for r in held])
         ]
         before, after = (_figure(axes[0], _rms(each)) for each in parts)
         out[name] = ActuatorShrinkage(before_rms=before, after_rms=after, unit=_unit(axes[0]))
     return out
 
 
-def _interval(judged: Sequence[Sequence[AxisChannel]], runs: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """95 % interval for one more run. Logarithms of the ratio vary as between the runs at hand; of a single one, as means
-    over STRETCHES_OF_ONE of its stretches do. Student's t.
-    """
-    if len(runs) > 1:
-        each = np.array([log_ratio(*r) for r in runs])
-        more = 1.0 + 1.0 / len(each)
-    else:
-        first, last = (np.concatenate([getattr(c, part) for c in judged[0]]) for part in ("first", "last"))
-        each = np.array([log_ratio(float(a), float(b)) for a, b in zip(first, last, strict=True)])
-        more = 1.0 / STRETCHES_OF_ONE + 1.0 / len(each)
-    return of_one_more(float(np.mean([log_ratio(*r) for r in runs])), *scatter(each), more)
-
-
-def _mean_square(channels: Sequence[AxisChannel], part: str) -> float:
-    return float(np.mean(np.concatenate([getattr(c, part) for c in channels])))
-
-
 def share_lag(found: Sequence[AxisFindings]) -> None:
     """One lag where one common value serves for all axes that move (contract, section 5)."""
     moving = [
-        a for a in found if a.following is not None and any(float(np.ptp(m.position)) > 0 for m in a.following.moves)
+        a
+        for a in found
+        if a.following is not None and any(float(np.ptp(r.move.position)) > 0 for r in a.following.fitted)
     ]
     lags = [(a, c) for a in moving for c in a.causes if c.effect == "servo_lag"]
     if len(lags) < 2 or len(lags) < len(moving):

@@ -86,9 +86,9 @@ def whole_errors(found: Sequence[AxisFindings]) -> dict[str, Errors]:
     """Errors by run and axis: set-point minus encoder, and encoder minus second encoder, each about its mean over the runs."""
     out: dict[str, dict[str, tuple[Floats, Floats]]] = {}
     for a, channel, sign in _channels(found):
-        middle = float(np.mean(np.concatenate([values for _, values in channel.whole])))
-        for k, (time, values) in zip(channel.runs, channel.whole, strict=True):
-            _add(out.setdefault(channel.all_names[k], {}), a.name, time, sign * (values - middle))
+        middle = float(np.mean(channel.rows))
+        for r in channel.fitted:
+            _add(out.setdefault(r.name, {}), a.name, r.whole[0], sign * (r.whole[1] - middle))
     return dict(out)
 
 
@@ -96,18 +96,14 @@ def held_errors(found: Sequence[AxisFindings], *, explained: bool) -> dict[str, 
     """Errors of withheld runs by run and axis, minus their constant or minus the fitted model."""
     out: dict[str, dict[str, tuple[Floats, Floats]]] = {}
     for a, channel, sign in _channels(found):
-        for k, values in (channel.held if explained else channel.held_whole).items():
-            _add(out.setdefault(channel.all_names[k], {}), a.name, channel.held_times[k], sign * values)
+        for r in channel.held:
+            _add(out.setdefault(r.name, {}), a.name, r.move.time, sign * (r.left if explained else r.gap))
     return dict(out)
 
 
 def position_floor(axis: AxisFindings) -> float:
     """Noise of the error of an axis, in the study's mm: of a channel at most the error that was measured."""
-    return float(np.sqrt(sum(min(c.floor**2, _variance(c)) for _, c, _ in _channels([axis]))))
-
-
-def _variance(channel: AxisChannel) -> float:
-    return float(np.var(np.concatenate([values for _, values in channel.whole])))
+    return float(np.sqrt(sum(min(c.floor**2, float(np.var(c.rows))) for _, c, _ in _channels([axis]))))
 
 
 def _channels(found: Sequence[AxisFindings]) -> list[tuple[AxisFindings, AxisChannel, float]]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.diagnosis.axis.gate import STRETCHES, AxisGate
+from camcomp.diagnosis.axis.gate import AxisGate
 from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, spikes
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
 from camcomp.diagnosis.result.types import FoundCause, Law, LawPart
@@ -158,50 +158,69 @@ class AxisDeviation:
         return AxisDeviation(None if rad is None else ARM_LENGTH * rad, None if torque is None else torque / ARM_LENGTH)
 
 
-def block_squares(values: Sequence[Floats]) -> Floats:
-    """Mean squares (b,) of values (n,) per run in STRETCHES blocks of equally many rows."""
-    each = max(STRETCHES // len(values), 2)
-    return np.array([np.mean(part**2) for own in values for part in np.array_split(own, each)])
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ChannelRun:
+    """One run of a channel, in the rows that count (n,). number: of the run in its experiment.
+
+    whole: times and values of every row. gap (n,): values without the constant of the fitted runs and, where the run is
+    judged only, without its disturbance forces. left (n,): residual.
+    """
+
+    name: str
+    number: int
+    fitted: bool
+    move: AxisTravel
+    whole: tuple[Floats, Floats]
+    gap: Floats
+    left: Floats
+
+    def of(self, rows: Bools) -> ChannelRun:
+        """Some of the rows (n,)."""
+        return replace(self, move=self.move.of(rows), gap=self.gap[rows], left=self.left[rows])
 
 
 @dataclass(eq=False, kw_only=True)
 class AxisChannel:
-    """One channel of one axis: values, residuals and their sizes block by block."""
+    """One channel of one axis: its runs, the fitted ones first, and its noise floor. columns (n, k): of what was fitted."""
 
-    values: list[Floats]  # per fitted run
-    runs: list[int]
-    first: Floats  # mean squares of blocks without causes
-    last: Floats
-    columns: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (n, k) of what was fitted
-    moves: list[AxisTravel] = field(default_factory=list)
-    left: list[Floats] = field(default_factory=list)  # per run
-    held: dict[int, Floats] = field(default_factory=dict)  # the same of runs that were never fitted, by their number
-    held_whole: dict[int, Floats] = field(
-        default_factory=dict
-    )  # of these runs, without the constant of the fitted ones
-    held_times: dict[int, Floats] = field(default_factory=dict)  # s
-    floor: float = 0.0
-    stated: bool = False
-    all_names: list[str] = field(default_factory=list)
-    whole: list[tuple[Floats, Floats]] = field(
-        default_factory=list
-    )  # time s, value of every row of every run, fitted or not
-    names: list[str] = field(default_factory=list)  # of the runs that the gate has seen
+    runs: list[ChannelRun]
+    floor: float
+    stated: bool
+    columns: Floats
     gate: AxisGate | None = None
 
-    def keep_held(self, run: int, rows: Bools) -> None:
-        """Judge a withheld run by some of its rows (n,) alone, where there are any."""
-        if rows.any() and not rows.all():
-            for each in (self.held, self.held_whole, self.held_times):
-                each[run] = each[run][rows]
-            self.first, self.last = (block_squares([*each.values()]) for each in (self.held_whole, self.held))
+    @property
+    def fitted(self) -> list[ChannelRun]:
+        """Runs that are fitted."""
+        return [r for r in self.runs if r.fitted]
+
+    @property
+    def held(self) -> list[ChannelRun]:
+        """Runs that are judged only."""
+        return [r for r in self.runs if not r.fitted]
+
+    @property
+    def left(self) -> list[Floats]:
+        """Residuals (n,) of the fitted runs."""
+        return [r.left for r in self.fitted]
+
+    @property
+    def squares(self) -> tuple[float, float]:
+        """Mean squares of the gap and of the residual, of runs that are judged only, where there are any."""
+        some = self.held or self.fitted
+        gap, left = (np.concatenate(each) for each in ([r.gap for r in some], [r.left for r in some]))
+        return float(np.mean(gap**2)), float(np.mean(left**2))
+
+    @property
+    def rows(self) -> Floats:
+        """Values of every row of the fitted runs, one run after the other."""
+        return np.concatenate([r.whole[1] for r in self.fitted])
 
     def followed(self, runs: Sequence[AxisRun]) -> list[Floats]:
         """Positions (n,) of runs by the fit of a following error: encoders without its residual."""
         paths = [run.encoder.copy() for run in runs]
-        fitted = {k: (m.time, left) for k, m, left in zip(self.runs, self.moves, self.left, strict=True)}
-        for k, (time, left) in {**fitted, **{k: (self.held_times[k], left) for k, left in self.held.items()}}.items():
-            paths[k][np.isin(runs[k].time, time)] += left
+        for r in self.runs:
+            paths[r.number][np.isin(runs[r.number].time, r.move.time)] += r.left
         return paths
 
 

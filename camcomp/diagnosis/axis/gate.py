@@ -8,10 +8,8 @@ from typing import Literal
 
 import numpy as np
 from scipy.stats import chi2, norm
-from scipy.stats import t as student
 
-from camcomp.diagnosis.model.folds import ABOVE
-from camcomp.diagnosis.model.noise import AT_FLOOR
+from camcomp.diagnosis.model.folds import Excess
 from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.ground.datatypes import Floats
@@ -52,16 +50,10 @@ def judge(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> Axis
     floor = max(floor, 1e-12)
     parts = max(STRETCHES // len(left), 2)
     size = np.array([energy(part, floor) for run in left for part in np.array_split(run, parts)]) / floor**2
-    spread = float(size.std(ddof=1)) / np.sqrt(len(size))
-    spread, freedom = max(spread, 1e-12), len(size) - 1
-    sure = float(student.ppf(0.99, freedom)) * spread
-    if size.mean() - sure > ABOVE:
-        by_size = float(student.logsf((size.mean() - ABOVE) / spread, freedom) / np.log(10.0))
-        return AxisGate("above", min(chance, by_size), found)
-    if found:
-        return AxisGate("above", chance, found)
-    high = size.mean() + float(student.ppf(0.95, freedom)) * spread
-    return AxisGate("at" if high < AT_FLOOR else "open", 0.0, ())
+    excess = Excess(float(size.mean()), float(size.std(ddof=1)) / np.sqrt(len(size)))
+    if excess.above or found:
+        return AxisGate("above", min(chance, excess.log10_chance if excess.above else 0.0), found)
+    return AxisGate("at" if excess.at_floor else "open", 0.0, ())
 
 
 def energy(left: Floats, floor: float) -> float:

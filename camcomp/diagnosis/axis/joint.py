@@ -21,7 +21,7 @@ from camcomp.diagnosis.axis.channel_data import TURNING, ChannelData, Response, 
 from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel
 from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
-from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisFindings, AxisRun, block_squares
+from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisFindings, AxisRun, ChannelRun
 from camcomp.diagnosis.axis.gate import WITHIN, judge, not_known
 from camcomp.diagnosis.axis.row_noise import log_gain
 from camcomp.diagnosis.axis.terms import AxisTravel, ripple, travel
@@ -126,7 +126,7 @@ class AxisSurroundings:
 class JointRows:
     """Rows of one channel of an axis: runs as logged, how the axis moved in the rows that count, and their values.
 
-    asymmetric: whether friction in its drive force differs between the directions, which deflects its loop.
+    numbers: of the runs in their experiment. whole: times and values of every row, where these are more. asymmetric: whether friction in its drive force differs between the directions, which deflects its loop.
     """
 
     channel: ChannelName
@@ -135,8 +135,10 @@ class JointRows:
     values: list[Floats]
     train: list[int]
     test: list[int]
+    numbers: Sequence[int]
     floor: float
     stated: bool
+    whole: Sequence[tuple[Floats, Floats]] = ()
     asymmetric: bool = False
 
 
@@ -182,8 +184,10 @@ def study_channel(
         rows = replace(rows, values=[each - own for each, own in zip(rows.values, apart, strict=True)])
     channel = _channel(rows, done, data.response)
     if following and done.acting:  # how well other rows are predicted says nothing of the causes
-        for k in rows.test:
-            channel.keep_held(k, axes[k].known([term.cause(own.tolist()) for term, own in done.acting])[seen[k]])
+        behind = [term.cause(own.tolist()) for term, own in done.acting]
+        known = {rows.numbers[k]: axes[k].known(behind)[seen[k]] for k in rows.test}
+        kept = {n: on for n, on in known.items() if on.any() and not on.all()}
+        channel.runs = [r.of(kept[r.number]) if r.number in kept else r for r in channel.runs]
     _tell(found, rows, done, data.healthy)
     if rows.channel == "force" and not rows.runs[0].revolute:
         _find_ripple(found, channel)
@@ -200,11 +204,11 @@ def study_channel(
 
 def _find_ripple(found: AxisFindings, channel: AxisChannel) -> None:
     """A line of the residual of a drive force over the travel, where it is larger than on healthy machines."""
-    line = ripple(channel.moves, channel.left)
+    line = ripple([r.move for r in channel.fitted], channel.left)
     if line is None or line.amplitude**2 / 2.0 <= (MINOR * channel.floor) ** 2:
         return
     found.ripple = line
-    phase = 2.0 * np.pi * np.concatenate([m.position for m in channel.moves]) / line.period
+    phase = 2.0 * np.pi * np.concatenate([r.move.position for r in channel.fitted]) / line.period
     waves = np.column_stack([np.sin(phase), np.cos(phase)])
     odds = log_gain(np.concatenate(channel.left), channel.columns, waves, channel.floor) - np.log(line.tried)
     found.unknown_chance = min(found.unknown_chance, float(-odds / np.log(10.0)))
@@ -418,31 +422,23 @@ def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, healthy: Seque
 
 
 def _channel(rows: JointRows, done: ChannelFit, response: Response) -> AxisChannel:
-    """Residuals of the fitted runs, and of those that are judged only, against the floor.
-
-    Disturbance forces of runs that are judged only are no part of what shrinks there.
-    """
-    moves, values, train, test = rows.moves, rows.values, rows.train, rows.test
+    """Residuals of the fitted runs, and of those that are judged only, against the floor."""
+    moves, values = rows.moves, rows.values
     constant = done.sizes["offset"][0] if rows.channel == "force" else 0.0
     pushing = [each for each in done.acting if each[0].run is not None]
     pushed = [response(k, pushing) for k in range(len(values))]
-    first = block_squares([values[k] - constant for k in train])
     channel = AxisChannel(
-        values=[values[k] for k in train], runs=train, first=first, last=block_squares([done.left[k] for k in train]),
-        floor=rows.floor, stated=rows.stated,
+        runs=[
+            ChannelRun(
+                name=rows.runs[k].name, number=rows.numbers[k], fitted=k in rows.train, move=moves[k],
+                whole=rows.whole[k] if rows.whole else (moves[k].time, values[k]),
+                gap=values[k] - constant - (0.0 if k in rows.train else pushed[k]), left=done.left[k],
+            )
+            for k in (*rows.train, *rows.test)
+        ],
+        floor=rows.floor, stated=rows.stated, columns=done.columns,
     )  # fmt: skip
-    channel.all_names = [run.name for run in rows.runs]
-    channel.moves, channel.left = [moves[k] for k in train], [done.left[k] for k in train]
-    channel.columns = done.columns
-    channel.whole = [(moves[k].time, values[k]) for k in train]
-    channel.held_whole = {k: values[k] - constant - pushed[k] for k in test}
-    if test:
-        channel.first = block_squares([channel.held_whole[k] for k in test])
-        channel.last = block_squares([done.left[k] for k in test])
-    channel.held = {k: done.left[k] for k in test}
-    channel.held_times = {k: moves[k].time for k in test}
-    order = [*train, *test]
-    channel.names = [rows.runs[k].name for k in order]
+    order = [*rows.train, *rows.test]
     left = [done.left[k] for k in order]
     if rows.channel == "force":  # beside what laws of friction and inertia are known to
         rise = shelf.load("effects", "disturbance").RISE_S

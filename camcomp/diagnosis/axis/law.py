@@ -43,7 +43,7 @@ class AxisRows(TermRows):
     def __init__(self, name: str, channel: AxisChannel, moves: Sequence[AxisTravel], *, force: bool) -> None:
         self.spot, self._name, self.moves = Spot("force" if force else "control", 0), name, moves
         self.left = [each if force else -each for each in channel.left]  # set-point minus encoder is what is studied
-        self.floor, self.wide = channel.floor, float(np.sqrt(np.mean(np.concatenate(channel.values) ** 2)))
+        self.floor, self.wide = channel.floor, float(np.sqrt(np.mean(channel.rows**2)))
         self.noise = noise_of(np.concatenate(self.left), channel.floor)
         size = np.sqrt(np.mean(channel.columns**2, axis=0)) + 1e-300
         self._taken = np.linalg.qr(channel.columns / size)[0]
@@ -124,7 +124,7 @@ def axis_law(
     own = force or following
     if own is None:
         return None
-    rows = AxisRows(name, own, force.moves if force else told, force=force is not None)
+    rows = AxisRows(name, own, [r.move for r in force.fitted] if force else told, force=force is not None)
     found = _found(rows)
     if found is None:
         return None

@@ -88,7 +88,7 @@ def stroke_table(moves: AxisMoves) -> str:
 
 def _left(axis: AxisFindings) -> float:
     """How far above their floors the channels are."""
-    return max((float(np.mean(c.last)) / max(c.floor, 1e-12) ** 2 for c in axis.channels), default=0.0)
+    return max((c.squares[1] / max(c.floor, 1e-12) ** 2 for c in axis.channels), default=0.0)
 
 
 def _designed(axis: AxisFindings, logs: Sequence[AxisRun], verdict: str) -> tuple[AxisMoves, float] | None:

@@ -132,14 +132,12 @@ def _nothing_below_the_floor(axis: AxisFindings) -> None:
     following = axis.following
     if following is None or following.gate is None:
         return
-    rows = np.concatenate([values for _, values in following.whole])
-    if float(np.std(rows)) > following.floor:
+    if float(np.std(following.rows)) > following.floor:
         return
     axis.causes = [c for c in axis.causes if not c.effect.startswith(("servo_", "speed_limit"))]
     following.gate = AxisGate("at", 0.0, ())
     if axis.laws:  # the machine file has none of them, and nothing of the gap is claimed
-        axis.laws, following.held = [], following.held_whole
-        following.left = following.values
+        axis.laws, following.runs = [], [replace(r, left=r.gap) for r in following.runs]
     if axis.force is None and axis.behind is None:
         axis.unknown_in, axis.law = [], None
 
@@ -167,9 +165,8 @@ class AxisTask:
 
     def rows(self, moves: list[AxisTravel], values: list[Floats], **of_channel: Any) -> JointRows:
         """Rows of a channel by its motion and values."""
-        return JointRows(
-            runs=self.usable, moves=moves, values=values, train=self.train, test=self.test, **of_channel
-        )  # fmt: skip
+        every = {"numbers": range(len(self.usable)), "runs": self.usable, "train": self.train, "test": self.test}
+        return JointRows(moves=moves, values=values, **{**every, **of_channel})
 
 
 def _axis(
@@ -191,8 +188,7 @@ def _axis(
         found = _second_encoder(found, task)
     _name_rest(found)
     if found.strange:
-        follows = found.following
-        asked = [(usable[k], m) for k, m in zip(follows.runs, follows.moves, strict=True)] if follows else []
+        asked = [(usable[r.number], r.move) for r in found.following.fitted] if found.following else []
         told = [travel(r.time, r.setpoint, found.wide).of(np.isin(r.time, m.time)) for r, m in asked]
         found.law = None if hinge else axis_law(name, found.force, found.following, told)
     return found
@@ -227,11 +223,11 @@ def _followed(
     runs, moves, values = motion_of(found, every, gaps, train, late)
     stated = found.stated.encoder_mm
     floor = stated or following_floor([(runs[k].setpoint, runs[k].encoder) for k in train])
-    rows = replace(task, usable=every).rows(
-        moves, values, channel="following", floor=floor, stated=stated is not None, asymmetric=asymmetric
-    )
+    rows = task.rows(
+        moves, values, channel="following", floor=floor, stated=stated is not None, asymmetric=asymmetric, runs=every,
+        whole=[(r.time, r.gap) for r in task.usable],
+    )  # fmt: skip
     found, found.following = study_channel(found, rows, task.around, task.without)
-    found.following.whole = [(task.usable[k].time, task.usable[k].gap) for k in found.following.runs]
     return found, late
 
 
@@ -250,9 +246,9 @@ def _forced(found: AxisFindings, task: AxisTask, late: float | None) -> AxisFind
     values = [own[rows] for own, rows in zip(values, on, strict=True)]
     stated = found.stated.force_N
     floor = stated or rows_floor([runs[k].force for k in task.train])
-    rows = task.rows(moves, values, channel="force", floor=floor, stated=stated is not None)
+    whole = [(r.time, r.force) for r in task.usable]
+    rows = task.rows(moves, values, channel="force", floor=floor, stated=stated is not None, whole=whole)
     found, found.force = study_channel(found, rows, task.around, task.without)
-    found.force.whole = [(task.usable[k].time, forces[k]) for k in found.force.runs]
     return found
 
 
@@ -266,11 +262,12 @@ def _second_encoder(found: AxisFindings, task: AxisTask) -> AxisFindings:
     own = max(rows_floor([r.encoder, np.asarray(r.load)]) for r in runs)
     stated = found.stated.encoder_mm
     floor = stated or float(np.hypot(np.sqrt(2.0) * own, REPEATABILITY_MM))
-    rows = replace(task, usable=runs, train=train, test=test).rows(
-        moves, values, channel="behind", floor=floor, stated=stated is not None
-    )
+    rows = task.rows(
+        moves, values, channel="behind", floor=floor, stated=stated is not None, runs=runs, train=train, test=test,
+        numbers=every,
+    )  # fmt: skip
     more, channel = study_channel(found, rows, task.around, task.without)
-    if float(np.std(np.concatenate([each for _, each in channel.whole]))) > floor:
+    if float(np.std(channel.rows)) > floor:
         found = more
     else:  # there is no gap that causes would explain
         channel.gate = AxisGate("at", 0.0, ())
@@ -289,7 +286,7 @@ def _name_rest(found: AxisFindings) -> None:
                 if _of_time(channel, found.ripple.period):
                     found.unknown_in.append((f"time:{found.name}", stretches))
                 continue
-            beyond = max(1.0 - channel.floor**2 / max(float(np.mean(channel.last)), 1e-300), 0.0)
+            beyond = max(1.0 - channel.floor**2 / max(channel.squares[1], 1e-300), 0.0)
             found.unknown_in.append((f"time:{found.name}", stretches or beyond))
 
 
@@ -297,12 +294,13 @@ def _of_time(channel: AxisChannel, period: float) -> bool:
     """Whether waves of a period mm over the position fail to explain most of the residual inside the gate's
     intervals.
     """
-    x = np.concatenate([m.position for m in channel.moves])
+    moves = [r.move for r in channel.fitted]
+    x = np.concatenate([m.position for m in moves])
     A = np.stack([wave(2.0 * np.pi * x / period) for wave in (np.ones_like, np.sin, np.cos)], axis=1)
     left = np.concatenate(channel.left)
     rest = left - A @ solve(A, left)
-    run = np.repeat(np.arange(len(channel.moves)), [len(m.time) for m in channel.moves])
-    time = np.concatenate([m.time for m in channel.moves])
+    run = np.repeat(np.arange(len(moves)), [len(m.time) for m in moves])
+    time = np.concatenate([m.time for m in moves])
     on = np.zeros(len(left), bool)
     for each in channel.gate.intervals if channel.gate is not None else ():
         on |= (run == each.run) & (time >= each.t0) & (time <= each.t1)

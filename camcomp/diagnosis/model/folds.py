@@ -10,11 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
 
 from camcomp.diagnosis.model.evidence import Background, LinearModel, Members
 from camcomp.diagnosis.model.group import SmoothProcess, split_regions
+from camcomp.diagnosis.model.noise import AT_FLOOR
 from camcomp.ground.datatypes import Floats
 
+SURELY, LIKELY = 2.33, 1.64  # standard errors: 99 % and 95 %, one side
 ABOVE = 1.25  # of the floor's square: instruments know themselves to an eighth
 REGIONS = 16  # of positions or time, between which squares are compared
 
@@ -31,11 +34,25 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Excess:
-    """Mean square of held-out residuals in units of the noise, its standard error, and the log predictive density."""
+    """Mean square of residuals in units of the noise, and its standard error."""
 
     mean: float
     error: float
-    density: float
+
+    @property
+    def above(self) -> bool:
+        """Whether the residual surely exceeds the noise."""
+        return self.mean - SURELY * self.error > ABOVE
+
+    @property
+    def at_floor(self) -> bool:
+        """Whether the residual is likely to be noise."""
+        return self.mean + LIKELY * self.error < AT_FLOOR
+
+    @property
+    def log10_chance(self) -> float:
+        """Logarithm of the chance of a mean square like this where the residual is noise."""
+        return float(norm.logsf((self.mean - ABOVE) / max(self.error, 1e-12)) / np.log(10.0))
 
 
 def folds_of(model: LinearModel) -> list[tuple[int, tuple[int, ...]]]:
@@ -48,17 +65,14 @@ def folds_of(model: LinearModel) -> list[tuple[int, tuple[int, ...]]]:
 
 def held_out(
     model: LinearModel, background: Background, members: Members, folds: Sequence[tuple[int, tuple[int, ...]]]
-) -> tuple[list[HeldOut], float]:
-    """Residuals of folds with a set and its background fitted to their other groups, and the sum of log predictive
-    densities.
-    """
+) -> list[HeldOut]:
+    """Residuals of folds with a set and its background fitted to their other groups."""
     slab = model.reduced(background).slab(members)
-    out, density = [], 0.0
+    out = []
     for g, others in folds:
         group, D = model.groups[g], model.layout.design(model.groups[g])
         before = model.posterior(background, slab, others)
         both = model.posterior(background, slab, (*others, g))
-        density += both.log_evidence - before.log_evidence
         left, near = group.y - D @ before.mean, group.y - D @ both.mean
         alone = all(model.groups[i].label != group.label for i in others)
         free = group.N.shape[2] if alone else 0
@@ -68,10 +82,10 @@ def held_out(
         if alone:
             left = without_nuisances(left, group.N)
         out.append(HeldOut(g, left, near, squares))
-    return out, density
+    return out
 
 
-def excess_of(model: LinearModel, parts: Sequence[HeldOut], density: float, freedom: float = np.inf) -> Excess:
+def excess_of(model: LinearModel, parts: Sequence[HeldOut], freedom: float = np.inf) -> Excess:
     """Mean square against the noise, with the standard error between regions and of the noise itself (freedom)."""
     total, count = [], []
     for part in parts:
@@ -86,7 +100,7 @@ def excess_of(model: LinearModel, parts: Sequence[HeldOut], density: float, free
     mean = float(s.sum() / n.sum())
     between = float(np.sqrt(((s - mean * n) ** 2).sum() * len(n) / max(len(n) - 1, 1)) / n.sum())
     even = mean * float(np.sqrt(2.0 / n.sum()))
-    return Excess(mean, float(np.hypot(max(between, even), mean * np.sqrt(2.0 / freedom))), density)
+    return Excess(mean, float(np.hypot(max(between, even), mean * np.sqrt(2.0 / freedom))))
 
 
 def without_nuisances(left: Floats, N: Floats) -> Floats:

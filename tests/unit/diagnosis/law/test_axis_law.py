@@ -68,7 +68,7 @@ def test_nothing_is_left_where_nothing_is_wrong():
     run, _ = axis_run(0.0)
     result, (axis,) = studied({"x": [run]})
     assert result.law is None
-    (moved,) = axis.following.moves
+    (moved,) = [r.move for r in axis.following.fitted]
     told = travel(run.time, run.setpoint, axis.wide).of(np.isin(run.time, moved.time))
     assert axis_law("x", axis.force, axis.following, [told]) is None
 
