@@ -14,10 +14,10 @@ from scipy.stats import norm
 from camcomp.diagnosis.arm.case import PoseCase
 from camcomp.diagnosis.arm.curves import curve_of
 from camcomp.diagnosis.arm.linear import covariate_of
-from camcomp.diagnosis.arm.next_poses import POSES_SEED, proposed, unseen_share
 from camcomp.diagnosis.arm.noise_floor import TipFloor
 from camcomp.diagnosis.arm.poses import CURVE
 from camcomp.diagnosis.model.calibration import calibration_of
+from camcomp.diagnosis.model.candidates import Place
 from camcomp.diagnosis.model.classes import alternatives_of
 from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
 from camcomp.diagnosis.model.evidence import Background
@@ -36,9 +36,7 @@ from camcomp.diagnosis.result.types import (
     IntervalShare,
     MinorEffect,
     NamedCause,
-    NextExperiment,
     PlaceShare,
-    PosesToMeasure,
     UnknownCause,
     Where,
     six_digits,
@@ -49,7 +47,6 @@ from camcomp.ground.datatypes import Floats
 
 MIN_LISTED_FLOORS = 0.01  # of the floor: an effect that moves the tip less is not listed
 PLACES = 8  # parts of the workspace
-REPEATS = 20  # poses to be visited again: a floor known to a sixth
 STRETCHES = 16  # of a campaign's time
 SHORTEST = 12  # poses in a stretch
 MOST_DRIVERS = 6  # that are listed
@@ -94,6 +91,10 @@ class AnswerInputs:
     def alternatives(self) -> list[tuple[int, ...]]:
         """Sets that are indistinguishable by these poses, the best first."""
         return alternatives_of(self.case.explanation, [c.place for c in self.case.shelf.candidates])
+
+    def places(self, members: Sequence[int]) -> list[Place]:
+        """Effects and targets of candidates."""
+        return [self.case.shelf.candidates[i].place for i in members]
 
 
 def gap(gaps: Sequence[Floats], floor: TipFloor | None) -> GapSize:
@@ -231,12 +232,8 @@ def _best(told: AnswerInputs, calibrate: Callable[[float], float]) -> float:
     found = told.case.explanation
     if not found.members:
         return 1.0 - calibrate(max(found.places.values(), default=0.0))
-    own = set(_places(told, found.members))
-    return calibrate(sum(p for m, p in found.sets if own <= set(_places(told, m))))
-
-
-def _places(told: AnswerInputs, members: Sequence[int]) -> list[tuple[str, str | None]]:
-    return [told.case.shelf.candidates[i].place for i in members]
+    own = set(told.places(found.members))
+    return calibrate(sum(p for m, p in found.sets if own <= set(told.places(m))))
 
 
 def with_unknown(told: AnswerInputs, named: tuple[FoundCause, ...], word: str) -> tuple[FoundCause, ...]:
@@ -255,7 +252,7 @@ def alternatives(told: AnswerInputs, named: Sequence[FoundCause]) -> tuple[tuple
     its rival.
     """
     known = tuple(NamedCause(effect=c.effect, target=c.target) for c in named if not isinstance(c, UnknownCause))
-    others = [tuple(NamedCause(effect=e, target=t) for e, t in _places(told, m)) for m in told.alternatives()[1:]]
+    others = [tuple(NamedCause(effect=e, target=t) for e, t in told.places(m)) for m in told.alternatives()[1:]]
     others = [each for each in others if each and known]
     return (known, *(others or [(*known, NamedCause(effect=UNKNOWN, target=None))]))
 
@@ -391,91 +388,6 @@ def _places_above(told: AnswerInputs) -> tuple[PlaceShare, ...]:
         share = round(float(square[own].sum()) / whole, 4)
         out.append(PlaceShare(x_mm=x, y_mm=y, z_mm=z, share=share, rms_um=_round(size)))
     return tuple(sorted(out, key=lambda each: -each.share))
-
-
-# -- what to measure next -----------------------------------------------------------------------------------------------
-
-
-def next_experiment(told: AnswerInputs, word: str) -> NextExperiment | None:
-    """The most informative poses, as a campaign of their own; repeats where the floor is unknown."""
-    if word in ("none", "identified"):
-        return None
-    case, whole = told.case, len(told.case.bench.campaigns) > 1
-    if told.floor is None and whole:
-        return _again(told)
-    on = [int(j) for j in np.flatnonzero(case.amount)]
-    columns = [case.shelf.columns[j] for j in on]
-    q, place, gain = proposed(case.bench, columns, case.covariance[np.ix_(on, on)], max(case.sd, 1e-6))
-    if not len(q):
-        return None if whole or not columns else _second_campaign(told, q, place)
-    if not whole:
-        return _second_campaign(told, q, place)
-    new = 100.0 * unseen_share(case.bench, columns, q)
-    effects = [*dict.fromkeys(p.effect for p in told.parts), UNKNOWN]
-    action = f"measure {len(q)} more poses with a clamping of their own"
-    if new:
-        action += f", {new:.0f} % of them with a joint at angles that no pose had"
-    return NextExperiment(
-        action=f"{action}; try them slowly first: collisions are not checked",
-        separates=tuple(effects),
-        gain=round(gain, 4),
-        outcomes=(
-            (
-                "If the causes found leave no more on these poses than on the others, they hold there as well and their "
-                "intervals become narrower."
-            ),
-            (
-                "If they leave more, and the curves of the joints explain it once these poses are fitted, the first poses "
-                "lacked those angles."
-            ),
-            "If they leave as much after that, what is unknown does not go by the angle of one joint.",
-        ),
-        poses=_listed(told, q, place),
-    )
-
-
-def _second_campaign(told: AnswerInputs, q: Floats, place: Floats) -> NextExperiment:
-    """Other postures, where there is one campaign only: within it, effects stand in for each other."""
-    sets_of = [_places(told, m) for m in told.alternatives()]
-    effects = list(dict.fromkeys(effect for each in sets_of for effect, _ in each))
-    sets = ["; ".join(e if t is None else f"{e} {t}" for e, t in each) for each in sets_of if each]
-    return NextExperiment(
-        action="measure a second campaign in other postures, with a clamping of its own",
-        separates=tuple(effects),
-        gain=round(float(np.log2(len(sets) + 1)), 4),
-        outcomes=(
-            *(f"If {one} alone predict the new poses, they are the cause." for one in sets[:2]),
-            "If no set predicts them, the cause is not in the library.",
-        ),
-        poses=_listed(told, q, place) if len(q) else None,
-    )
-
-
-def _again(told: AnswerInputs) -> NextExperiment:
-    """Repeats: every other quantile of the poses there are, in an order that does not stay in one place."""
-    effects = [*dict.fromkeys(p.effect for p in told.parts), UNKNOWN]
-    campaign = told.case.bench.campaigns[0]
-    some = np.unique(np.linspace(0, len(campaign.q) - 1, REPEATS).astype(int))
-    some = some[np.random.default_rng(POSES_SEED).permutation(len(some))]
-    again = campaign.take(some)
-    return NextExperiment(
-        action=f"visit {REPEATS} of the poses once more, other poses in between, so that the floor is known",
-        separates=tuple(effects),
-        gain=1.0,
-        outcomes=(
-            "If visits of one pose differ by as much as the causes leave, nothing is left to explain.",
-            "If they differ by less, something unknown is at work.",
-        ),
-        poses=_listed(told, again.q, told.case.bench.standing(again, ()).hung.point),
-    )
-
-
-def _listed(told: AnswerInputs, q: Floats, place: Floats) -> PosesToMeasure:
-    return PosesToMeasure(
-        joints=told.case.bench.actuators,
-        positions=tuple(tuple(round(float(v), 6) for v in row) for row in q),
-        platform_mm=tuple((_round(x), _round(y), _round(z)) for x, y, z in place),
-    )
 
 
 def _size(parts: Sequence[Floats]) -> float:

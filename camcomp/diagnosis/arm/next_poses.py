@@ -1,80 +1,82 @@
-"""Which poses to measure next: those that tell most about what is still uncertain, chosen one by one and then exchanged.
-
-What a pose tells is its expected information about the effects of a linearised model, beside a frame of its own that the
-new campaign brings along (log det; Fedorov, Theory of Optimal Experiments, 1972).
+"""Which poses to measure next: the most informative ones about the causes found, with frames of their own; repeats where
+the noise floor is unknown.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from camcomp.diagnosis.arm.curves import covered, seen_angles
-from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Column, Poses
+from camcomp.diagnosis.arm.answer import AnswerInputs
+from camcomp.diagnosis.arm.poses import ArmBench, Column, Poses
+from camcomp.diagnosis.model.design import bits, designed
+from camcomp.diagnosis.result.types import UNKNOWN, NextExperiment, PosesToMeasure
 from camcomp.ground.datatypes import Floats
+from camcomp.model.statics.arm import ARM_LENGTH
 
 POSES = 40  # of a proposal: an hour with a tracker
+REPEATS = 20  # poses to be visited again: a floor known to a sixth
 CANDIDATES = 400  # postures that are looked at
-EXCHANGES = 2  # rounds in which every pose may be exchanged for a better one
-FRAME = 10.0  # prior deviation of the new campaign's frame and target, in mm, and mm at ARM_MM for its turns
-ARM_MM = 1000.0
+FRAME = 10.0  # prior deviation of the new campaign's frame and target, in mm, and mm at the end of an arm for its turns
 POSES_SEED = 20201110  # the same answer twice
 
 
-@dataclass(frozen=True, eq=False)
-class Design:
-    """Poses chosen, as indices of the candidates in the order of choice, their information (bits), what stays uncertain (k, k)."""
+def next_poses(told: AnswerInputs, word: str) -> NextExperiment | None:
+    """The most informative poses, as a campaign of their own; repeats where the floor is unknown."""
+    if word in ("none", "identified"):
+        return None
+    case, several = told.case, len(told.case.bench.campaigns) > 1
+    effects = [*dict.fromkeys(p.effect for p in told.parts), UNKNOWN]
+    if told.floor is None and several:
+        return NextExperiment(
+            action=f"visit {REPEATS} of the poses once more, other poses in between, so that the floor is known",
+            separates=tuple(effects), gain=1.0, poses=_listed(case.bench, _repeats(case.bench.campaigns[0])),
+            outcomes=(
+                "If visits of one pose differ by as much as the causes leave, nothing is left to explain.",
+                "If they differ by less, something unknown is at work.",
+            ),
+        )  # fmt: skip
+    on = [int(j) for j in np.flatnonzero(case.amount)]
+    columns = [case.shelf.columns[j] for j in on]
+    q, gain = proposed(case.bench, columns, case.covariance[np.ix_(on, on)], max(case.sd, 1e-6))
+    poses = _listed(case.bench, q) if len(q) else None
+    if not several and columns:
+        return _second_campaign(told, poses, gain)
+    if poses is None:
+        return None
+    return NextExperiment(
+        action=f"measure {len(q)} more poses with a clamping of their own; try them slowly first: collisions are not checked",
+        separates=tuple(effects), gain=round(gain, 4), poses=poses,
+        outcomes=(
+            ("If the causes found leave no more on these poses than on the others, they hold there as well and their "
+            "intervals become narrower."),
+            ("If they leave more, and the curves of the joints explain it once these poses are fitted, the first poses "
+            "lacked those angles."),
+            "If they leave as much after that, what is unknown does not go by the angle of one joint.",
+        ),
+    )  # fmt: skip
 
-    chosen: tuple[int, ...]
-    gain: float
-    covariance: Floats
+
+def _second_campaign(told: AnswerInputs, poses: PosesToMeasure | None, gain: float) -> NextExperiment:
+    """Other postures, where there is one campaign only: within it, effects stand in for each other."""
+    sets = [told.places(m) for m in told.alternatives()]
+    names = ["; ".join(e if t is None else f"{e} {t}" for e, t in each) for each in sets if each]
+    return NextExperiment(
+        action="measure a second campaign in other postures, with a clamping of its own",
+        separates=tuple(dict.fromkeys(effect for each in sets for effect, _ in each)), gain=round(gain, 4), poses=poses,
+        outcomes=(
+            *(f"If {one} alone predict the new poses, they are the cause." for one in names[:2]),
+            "If no set predicts them, the cause is not in the library.",
+        ),
+    )  # fmt: skip
 
 
-def designed(X: Floats, covariance: Floats, noise: float, count: int) -> Design:
-    """`count` of n candidates with rows X (n, 3, k) under a prior covariance (k, k), noise mm per coordinate."""
-    belief = _Belief(X, covariance, noise)
-    chosen: list[int] = []
-    for _ in range(min(count, len(X))):
-        chosen.append(belief.take(belief.best(chosen)))
-    for _ in range(EXCHANGES):
-        for i in range(len(chosen)):
-            belief.give_back(chosen[i])
-            rest = chosen[:i] + chosen[i + 1 :]
-            chosen[i] = belief.take(belief.best(rest))
-    return Design(tuple(chosen), _bits(covariance, belief.covariance), belief.covariance)
-
-
-class _Belief:
-    """Posterior covariance of the effects after some poses, updated pose by pose."""
-
-    def __init__(self, X: Floats, covariance: Floats, noise: float) -> None:
-        self.X, self.covariance = X, covariance.copy()
-        self.square = noise**2 * np.eye(3)
-        self.spread = np.einsum("nik,kl,njl->nij", X, covariance, X, optimize=True)  # of every candidate's tip
-
-    def best(self, without: list[int]) -> int:
-        """The most informative candidate outside of `without`."""
-        value = np.linalg.slogdet(np.eye(3) + self.spread / self.square[0, 0])[1]
-        value = np.array(value)
-        value[without] = -np.inf
-        return int(np.argmax(value))
-
-    def take(self, k: int) -> int:
-        """Measures a candidate."""
-        self._move(k, np.linalg.inv(self.spread[k] + self.square), -1.0)
-        return k
-
-    def give_back(self, k: int) -> None:
-        """As if a candidate had not been measured."""
-        self._move(k, np.linalg.inv(self.square - self.spread[k]), 1.0)
-
-    def _move(self, k: int, weight: Floats, sign: float) -> None:
-        along = self.covariance @ self.X[k].T
-        self.covariance += sign * along @ weight @ along.T
-        ahead = self.X @ along
-        self.spread += sign * ahead @ weight @ np.swapaxes(ahead, 1, 2)
+def _repeats(campaign: Poses) -> Floats:
+    """Joints (REPEATS, m) of every other quantile of the poses, in an order that does not stay in one place."""
+    some = np.unique(np.linspace(0, len(campaign.q) - 1, REPEATS).astype(int))
+    return np.asarray(campaign.q[some[np.random.default_rng(POSES_SEED).permutation(len(some))]], float)
 
 
 def candidates(bench: ArmBench, count: int = CANDIDATES) -> Floats:
@@ -83,67 +85,57 @@ def candidates(bench: ArmBench, count: int = CANDIDATES) -> Floats:
     Fewer where few of the drawn postures stand there; the seed is fixed. Collisions are not checked.
     """
     rng = np.random.default_rng(POSES_SEED)
-    drives = bench.robot.actuators
     seen = np.concatenate([each.q for each in bench.campaigns])
-    points = np.concatenate([bench.standing(each, ()).hung.point for each in bench.campaigns])
-    box = points.min(axis=0), points.max(axis=0)
-    ends = []
-    for a, drive in enumerate(drives):
-        low, high = drive.limits
-        if drive.revolute:
-            low, high = max(low, -np.pi), min(high, np.pi)
-        elif not np.isfinite([low, high]).all():
-            low, high = float(seen[:, a].min()), float(seen[:, a].max())
-        ends.append((low, high) if low < high else (float(seen[:, a].min()), float(seen[:, a].max())))
-    lowest, highest = np.array(ends).T
-    q = lowest + (highest - lowest) * rng.random((20 * count, len(drives)))
-    point = bench.standing(_as_poses(q), ()).hung.point
-    inside = np.flatnonzero(((point >= box[0]) & (point <= box[1])).all(axis=1))
+    points = np.concatenate([_places(bench, each.q) for each in bench.campaigns])
+    low, high = np.array([a.limits for a in bench.robot.actuators], float).T
+    turns = np.array([a.revolute for a in bench.robot.actuators])
+    low, high = np.where(turns, np.maximum(low, -np.pi), low), np.where(turns, np.minimum(high, np.pi), high)
+    known = np.isfinite(low) & np.isfinite(high) & (low < high)
+    low, high = np.where(known, low, seen.min(axis=0)), np.where(known, high, seen.max(axis=0))
+    q = low + (high - low) * rng.random((20 * count, len(low)))
+    place = _places(bench, q)
+    inside = np.flatnonzero(((place >= points.min(axis=0)) & (place <= points.max(axis=0))).all(axis=1))
     return np.asarray(q[inside[:count]], float)
 
 
-def proposed(
-    bench: ArmBench, columns: Sequence[Column], covariance: Floats, noise: float
-) -> tuple[Floats, Floats, float]:
-    """Joints (POSES, m) to measure in a new campaign, their platform points (POSES, 3), and the expected information
-    (bits).
+def proposed(bench: ArmBench, columns: Sequence[Column], covariance: Floats, noise: float) -> tuple[Floats, float]:
+    """Joints (POSES, m) to measure in a new campaign, and their expected information on the effects, bits.
 
     columns with their covariance (k, k): the effects to determine. Empty without columns, or where candidate poses are
     missing.
     """
-    q = candidates(bench)
-    if not columns or not len(q):
-        return np.zeros((0, len(bench.actuators))), np.zeros((0, 3)), 0.0
+    q = candidates(bench) if columns else np.zeros((0, len(bench.actuators)))
+    if not len(q):
+        return q, 0.0
     poses = _as_poses(q)
-    place = bench.standing(poses, ()).hung.point
-    poses = replace(poses, tip=bench.start[0].tips(place, bench.standing(poses, ()).hung.rotation))
+    stood = bench.standing(poses, ()).hung
+    poses = replace(poses, tip=bench.start[0].tips(stood.point, stood.rotation))
     there = ArmBench(robot=bench.robot, causes=bench.causes, campaigns=[poses])
     group = there.groups(columns, noise)[0]
     k = len(columns)
-    whole = np.zeros((k + 9,) * 2)
+    whole = np.diag(np.concatenate([np.ones(k), [FRAME / ARM_LENGTH] * 3, [FRAME] * 6]) ** 2)
     whole[:k, :k] = covariance + 1e-12 * np.eye(k)
-    whole[k:, k:] = np.diag([FRAME / ARM_MM] * 3 + [FRAME] * 6) ** 2
-    design = designed(np.concatenate([group.A, group.N], axis=2), whole, noise, POSES)
-    chosen = list(design.chosen)
-    return q[chosen], place[chosen], _bits(whole[:k, :k], design.covariance[:k, :k])
+    design = designed(np.concatenate([group.A, group.N], axis=2) / noise, whole, POSES)
+    return q[list(design.chosen)], bits(whole[:k, :k]) - bits(design.covariance[:k, :k])
 
 
-def _bits(before: Floats, after: Floats) -> float:
-    """Information gained where a covariance (k, k) becomes another."""
-    return 0.5 * float(np.linalg.slogdet(before)[1] - np.linalg.slogdet(after)[1]) / float(np.log(2.0))
-
-
-def unseen_share(bench: ArmBench, columns: Sequence[Column], q: Floats) -> float:
-    """Share of poses q (n, m) in which some joint with a curve stands where no pose was."""
-    joints = sorted({bench.actuators.index(str(c.target)) for c in columns if c.effect == CURVE})
-    if not joints or not len(q):
-        return 0.0
-    angles = np.concatenate([bench.campaigns[k].q for k in bench.own])
-    return float(1.0 - covered({a: seen_angles(angles[:, a]) for a in joints}, q).mean())
+def _places(bench: ArmBench, q: Floats) -> Floats:
+    """Platform points (n, 3) of joints q (n, m)."""
+    return np.asarray(bench.standing(_as_poses(q), ()).hung.point, float)
 
 
 def _as_poses(q: Floats) -> Poses:
     n = len(q)
     return Poses(
         label="next", q=q, tip=np.zeros((n, 3)), time=np.arange(float(n)), temperature=None, run=np.full(n, "next")
+    )
+
+
+def _listed(bench: ArmBench, q: Floats) -> PosesToMeasure:
+    return PosesToMeasure(
+        joints=bench.actuators,
+        positions=tuple(tuple(round(float(v), 6) for v in row) for row in q),
+        platform_mm=tuple(
+            (round(float(x), 3), round(float(y), 3), round(float(z), 3)) for x, y, z in _places(bench, q)
+        ),
     )

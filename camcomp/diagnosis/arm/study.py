@@ -15,6 +15,7 @@ import numpy as np
 from camcomp.diagnosis.arm import answer
 from camcomp.diagnosis.arm.case import PoseCase, named_rows
 from camcomp.diagnosis.arm.linear import Shelf, linearise
+from camcomp.diagnosis.arm.next_poses import next_poses
 from camcomp.diagnosis.arm.noise_floor import StatedDeviation, TipFloor, far_off, least_floor, resolution, tip_floor
 from camcomp.diagnosis.arm.pose_values import of_poses
 from camcomp.diagnosis.arm.poses import ArmBench, Poses, combined
@@ -320,7 +321,7 @@ def studied(
         verdict=word, gap=answer.gap(told.gaps, floor), where=answer.where(told, word), causes=named,
         alternatives=alternatives if word == "ambiguous" or len(alternatives) > 1 else (),
         shrinkage=shrinkage(case, named, sorted(names), bool(holdout)), minor=minor,
-        next_experiment=answer.next_experiment(told, word),
+        next_experiment=next_poses(told, word),
         floor=Floor(um=round(floor.um, 3), source=floor.source) if floor else Floor(um=None, source="not identifiable"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(set(case.outliers))),
         standards=of_poses(robot, bench.campaigns, gaps),

@@ -1,9 +1,7 @@
-"""What to measure next on a single axis: strokes there and back, chosen for what they tell of what a leftover goes with.
+"""What to measure next on a single axis: strokes there and back, chosen for their expected information.
 
-Each covariate that the leftover may be a function of is a hypothesis, and so is that nothing is left where the rows were too few to
-say. A block of strokes has a place, a length and a speed inside what the runs had. Two hypotheses are told apart by what any
-function of the one leaves once a function of the other is fitted; the gain is the expected fall of the entropy over them,
-less the price of the time. Blocks are taken one by one while that grows.
+A block of strokes has a place, a length and a speed inside what the runs had. What is left of the axis may be any function of
+its position, speed and acceleration; the blocks that tell most of all of these together are proposed (`model/design.py`).
 """
 
 from __future__ import annotations
@@ -17,23 +15,20 @@ from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.findings import AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import STRETCH_S
 from camcomp.diagnosis.axis.terms import travel
-from camcomp.diagnosis.model.noise import AT_FLOOR
+from camcomp.diagnosis.model.design import designed
+from camcomp.diagnosis.model.discrepancy import smooth_functions
 from camcomp.diagnosis.next_experiment.design import SETUP_MIN
-from camcomp.diagnosis.next_experiment.proposal import PRICE, WORTH
 from camcomp.diagnosis.result.types import UNKNOWN, AxisMoves, NextExperiment, StrokeBlock
-from camcomp.diagnosis.statistics.expected_gain import expected_gain
 from camcomp.ground.datatypes import Floats
 
+BLOCKS = 4  # of a proposal
 BLOCK_S = 20.0  # of strokes; one there and back at least
 LONGEST_S = 60.0  # of one there and back
 LENGTHS = (1.0, 0.3, 0.05)  # of the travel that the runs had
 SPEEDS = (0.05, 0.2, 0.5, 1.0)  # of the speed that they had
 REST_S = 0.2  # at either end of a stroke
 USED = 0.99  # quantile of what the runs had that strokes may have
-LEAST_WEIGHT = 0.1  # of a covariate that the leftover does not seem to go with
-ROWS = 400  # of a foreseen motion
-STEPS = 12  # of a function of a covariate
-_NOTHING = "nothing"
+ROWS = 200  # of a foreseen motion
 _MEANS = {
     "position": "If what is left of {0} is the same at the same place in every stroke, it goes with the position: screw, scale or guide.",
     "velocity": "If it changes with the speed, or from one way to the other, it goes with the velocity: friction or the loop.",
@@ -49,19 +44,15 @@ def next_moves(
     if verdict not in (UNKNOWN, "ambiguous"):
         return None
     asked = [a for a in found if a.strange] or found  # something unknown is asked of the axes that show it
-    for axis in sorted(asked, key=_left, reverse=True):
+    for axis in sorted(asked, key=_excess, reverse=True):
         logs = [run for run in runs[axis.name] if np.isfinite(run.encoder).sum() > 2 * axis.wide + 1]
-        designed = _designed(axis, logs, verdict)
+        designed = _designed(axis, logs)
         if designed is not None:
             moves, bits = designed
             return NextExperiment(
-                action=_action(moves),
-                separates=(UNKNOWN,),
-                gain=round(bits, 4),
-                minutes=round(_minutes(moves), 1),
-                outcomes=_outcomes(axis, verdict),
-                moves=moves,
-            )
+                action=_action(moves), separates=(UNKNOWN,), gain=round(bits, 4), minutes=round(_minutes(moves), 1),
+                outcomes=_outcomes(axis, verdict), moves=moves,
+            )  # fmt: skip
     return None
 
 
@@ -86,16 +77,17 @@ def stroke_table(moves: AxisMoves) -> str:
     return f"t_s,cmd_{moves.axis}_{moves.unit}\n{''.join(rows)}"
 
 
-def _left(axis: AxisFindings) -> float:
+def _excess(axis: AxisFindings) -> float:
     """How far above their floors the channels are."""
     return max((c.squares[1] / max(c.floor, 1e-12) ** 2 for c in axis.channels), default=0.0)
 
 
-def _designed(axis: AxisFindings, logs: Sequence[AxisRun], verdict: str) -> tuple[AxisMoves, float] | None:
-    """Strokes and their expected information, bits."""
+def _designed(axis: AxisFindings, logs: Sequence[AxisRun]) -> tuple[AxisMoves, float] | None:
+    """Strokes in the unit of the axis and their expected information, bits; None where the runs do not move."""
     if not logs:
         return None
-    seen = [travel(run.time, run.encoder, axis.wide) for run in logs]
+    lever = lever_mm(axis.revolute)
+    seen = [travel(run.time, run.encoder / lever, axis.wide) for run in logs]
     position, speed, push = (
         np.concatenate([getattr(at, part) for at in seen]) for part in ("position", "speed", "acceleration")
     )
@@ -104,55 +96,26 @@ def _designed(axis: AxisFindings, logs: Sequence[AxisRun], verdict: str) -> tupl
     step = float(np.median(np.concatenate([np.diff(run.time) for run in logs])))
     if not (high - low > 0.0 and fastest > 0.0 and hardest > 0.0 and step > 0.0):
         return None
-    bins = {"position": _bins(position), "velocity": _bins(speed), "acceleration": _bins(push)}
-    weight = _weights(axis, verdict)
-    kinds, probability = tuple(weight), np.array([*weight.values()]) / sum(weight.values())
-    size = 1.0 if verdict == UNKNOWN else np.sqrt(AT_FLOOR - 1.0)  # it may be no larger there than the floor
     blank = AxisMoves(
-        axis=axis.name, unit="rad" if logs[0].revolute else "mm", blocks=(), acceleration=_tidy(hardest), step_s=step
+        axis=axis.name, unit="rad" if axis.revolute else "mm", blocks=(), acceleration=_tidy(hardest), step_s=step
     )
-    best, bits, value = blank, 0.0, 0.0
-    while True:
-        found = []
-        for block in _blocks(low, high, fastest, hardest):
-            moves = blank.model_copy(update={"blocks": (*best.blocks, block)})
-            gain = expected_gain(_apart(moves, kinds, bins, float(size)), probability)
-            found.append((gain - PRICE * _minutes(moves), gain, moves))
-        better = max(found, key=lambda each: each[0])
-        if better[0] <= value:
-            break
-        value, bits, best = better
-    return (_in_own_unit(best), bits) if best.blocks and bits > WORTH else None
+    blocks = list(_blocks(low, high, fastest, hardest))
+    ends = (low, high), (-fastest, fastest), (-hardest, hardest)
+    rows = [_functions(blank.model_copy(update={"blocks": (each,)}), ends) for each in blocks]
+    if not rows:
+        return None
+    design = designed(np.array(rows), np.eye(rows[0].shape[1]), BLOCKS)
+    return blank.model_copy(update={"blocks": tuple(blocks[i] for i in design.chosen)}), design.gain
 
 
-def _in_own_unit(moves: AxisMoves) -> AxisMoves:
-    """Strokes of a hinge in rad, which the study has in mm at the end of its arm."""
-    if moves.unit == "mm":
-        return moves
-    lever = lever_mm(True)
-    blocks = tuple(
-        b.model_copy(update={"low": b.low / lever, "high": b.high / lever, "speed": b.speed / lever})
-        for b in moves.blocks
-    )
-    return moves.model_copy(update={"blocks": blocks, "acceleration": moves.acceleration / lever})
-
-
-def _weights(axis: AxisFindings, verdict: str) -> dict[str, float]:
-    """Hypotheses with their weights: covariates by the share of the leftover that goes with them."""
-    out = dict.fromkeys(_MEANS, LEAST_WEIGHT)
-    found = [(kind, share) for kind, of, share in _depends_on(axis) if of == axis.name]
-    if axis.ripple is not None:
-        found.append(("position", axis.ripple.share))
-    for kind, share in found:
-        kind = "velocity" if kind == "reversal" else kind  # strokes of any speed turn round
-        out[kind] = max(out[kind], share)
-    return out if verdict == UNKNOWN else out | {_NOTHING: sum(out.values())}
-
-
-def _depends_on(axis: AxisFindings) -> list[tuple[str, str, float]]:
-    """Kind of covariate, its axis, and the share of the residual that depends on it."""
-    parted = [(name.partition(":"), share) for name, share in axis.unknown_in]
-    return [(kind, of, share) for (kind, _, of), share in parted]
+def _functions(moves: AxisMoves, ends: Sequence[tuple[float, float]]) -> Floats:
+    """Functions (n, k) of position, speed and acceleration of strokes, one floor in size; a stretch of time counts once."""
+    time, place = set_points(moves)
+    speed = np.gradient(place, time)
+    some = np.linspace(0, len(time) - 1, ROWS).astype(int)
+    motion = place, speed, np.gradient(speed, time)
+    each = [smooth_functions(values[some], *own) for values, own in zip(motion, ends, strict=True)]
+    return np.asarray(np.hstack(each) * np.sqrt(time[-1] / STRETCH_S / len(some)), float)
 
 
 def _blocks(low: float, high: float, fastest: float, hardest: float) -> Iterator[StrokeBlock]:
@@ -165,43 +128,6 @@ def _blocks(low: float, high: float, fastest: float, hardest: float) -> Iterator
             if once <= LONGEST_S:
                 times = max(round(BLOCK_S / once), 1)
                 yield StrokeBlock(low=_tidy(ends[0]), high=_tidy(ends[1]), speed=_tidy(speed), times=times)
-
-
-def _apart(moves: AxisMoves, kinds: Sequence[str], bins: Mapping[str, Floats], size: float) -> Floats:
-    """Chi-square (r, r) by which hypothesis j misses a residual of `size` floors that is a function of i.
-
-    bins: limits between which a function of a covariate is constant, from the runs. A stretch of time counts once.
-    """
-    time, place = set_points(moves)
-    some = np.unique(np.linspace(0, len(time) - 1, ROWS).astype(int))
-    speed = np.gradient(place, time)
-    over = {"position": place, "velocity": speed, "acceleration": np.gradient(speed, time), "time": time}
-    functions = {
-        kind: _steps(over[kind][some], bins[kind] if kind in bins else _bins(time))
-        for kind in kinds
-        if kind != _NOTHING
-    }
-    out = np.zeros((len(kinds), len(kinds)))
-    for (i, one), (j, other) in product(enumerate(kinds), repeat=2):
-        if i != j:
-            real = functions[other if one == _NOTHING else one]
-            rest = real
-            if _NOTHING not in (one, other):
-                base = np.linalg.qr(functions[other])[0]
-                rest = real - base @ (base.T @ real)
-            out[i, j] = float((rest**2).sum()) / len(some) * size**2 * time[-1] / STRETCH_S
-    return out
-
-
-def _bins(values: Floats) -> Floats:
-    """Edges between values (n,) of equally many rows."""
-    return np.unique(np.quantile(values, np.linspace(0.0, 1.0, STEPS + 1)[1:-1]))
-
-
-def _steps(values: Floats, edges: Floats) -> Floats:
-    """Steps (n, k) of values (n,) between edges, without their means."""
-    steps = (np.searchsorted(edges, values)[:, None] == np.arange(len(edges) + 1)).astype(float)
-    return np.asarray(steps - steps.mean(axis=0))
 
 
 def _way(start: float, end: float, speed: float, acceleration: float, step: float) -> Floats:
@@ -246,9 +172,16 @@ def _outcomes(axis: AxisFindings, verdict: str) -> tuple[str, ...]:
             f"If these strokes leave no more than the noise, {names} is all that acts on {axis.name}.",
             "If they leave more, something acts on it that no effect of the library explains.",
         )
-    weight = _weights(axis, verdict)
-    others = dict.fromkeys(of for _, of, _ in _depends_on(axis) if of != axis.name)
+    found = [(*name.partition(":")[::2], share) for name, share in axis.unknown_in]
+    found += [] if axis.ripple is None else [("position", axis.name, axis.ripple.share)]
+    share = dict.fromkeys(_MEANS, 0.0)
+    for kind, of, own in found:
+        kind = "velocity" if kind == "reversal" else kind  # strokes of any speed turn round
+        share[kind] = max(share[kind], own) if of == axis.name else share[kind]
     return (
-        *(f"If nothing is left of {axis.name} when it moves alone, it goes with how {of} moves." for of in others),
-        *(_MEANS[kind].format(axis.name) for kind in sorted(weight, key=lambda each: -weight[each])),
+        *(
+            f"If nothing is left of {axis.name} when it moves alone, it goes with how {of} moves."
+            for of in dict.fromkeys(of for _, of, _ in found if of != axis.name)
+        ),
+        *(_MEANS[kind].format(axis.name) for kind in sorted(share, key=lambda each: -share[each])),
     )

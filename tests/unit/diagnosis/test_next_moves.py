@@ -42,7 +42,7 @@ def test_strokes_stay_inside_what_the_runs_had(found, log):
 def test_they_tell_what_a_leftover_goes_with(found):
     """Places, speeds and ways occur in more than one combination: a function of one of them is none of another."""
     proposal = found.next_experiment
-    assert 0.5 < proposal.gain <= 2.0  # of four covariates
+    assert 0.0 < proposal.gain < 24 * 0.5 * np.log2(1.0 + 4 * 60.0 / 0.5)  # of 24 functions in four blocks of a minute
     assert len({(each.low, each.high) for each in proposal.moves.blocks}) > 1
     assert "position" in proposal.outcomes[0] and len(proposal.outcomes) == 4
     assert proposal.separates == ("unknown",)
