@@ -17,7 +17,7 @@ from camcomp.diagnosis.axis.terms import AxisTravel, ripple
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermRows
 from camcomp.diagnosis.law.describe import law_result
 from camcomp.diagnosis.law.find import BETTER, FoundLaw, find_law, fitted, strengths
-from camcomp.diagnosis.law.folds import Folds, Split, White, usual_split
+from camcomp.diagnosis.law.folds import Folds, RunColumns, Split, usual_split
 from camcomp.diagnosis.law.forms import Form, at_drive
 from camcomp.diagnosis.law.screen import grids_of
 from camcomp.diagnosis.law.shapes import Shapes
@@ -78,13 +78,9 @@ class AxisRows(TermRows):
         X = np.concatenate(values)
         return np.asarray(np.sqrt(np.mean((X - self._taken @ (self._taken.T @ X)) ** 2, axis=0)))
 
-    def white(self, spot: Spot, values: Sequence[Floats]) -> White:
+    def white(self, spot: Spot, values: Sequence[Floats]) -> RunColumns:
         """Functions (n, f) per run over the noise."""
-        return White(tuple(np.arange(n) for n in self.row_counts), tuple(v / self.noise for v in values))
-
-    def white_rows(self, spot: Spot) -> int:
-        """All rows."""
-        return sum(self.row_counts)
+        return [ByChannel(v.shape[1], ((np.arange(v.shape[1]), v / self.noise),)) for v in values]
 
     def shown(self, spot: Spot) -> Sequence[Floats]:
         """Instants of all rows."""
@@ -111,7 +107,7 @@ class AxisRows(TermRows):
         base = folds.means(found.columns, found.precision)
         for k, m in enumerate(self.moves):
             part = 1 + k * folds.split.parts + folds.split.of((m.time - m.time[0]) / max(float(np.ptp(m.time)), 1e-12))
-            X = self.noise * np.concatenate([each.columns[k] for each in found.columns], axis=1)
+            X = self.noise * ByChannel.joined([each[k] for each in found.columns]).parts[0][1]
             own = np.einsum("nc,nc->n", X, found.theta_without[part - 1])
             out.append(self.left[k] - own - np.einsum("nk,nk->n", self._base[k], base[part]))
         return out
@@ -158,7 +154,7 @@ def _found(rows: AxisRows) -> FoundLaw | None:
         forms = [f for f in some if f.family != "wave" and f.about != ("common_s",)]
         if not forms and not waves:  # an axis that stands
             return None
-        grids = grids_of(rows, [((rows.spot,), [*forms, *waves])])
+        grids = grids_of([((rows.spot,), [*forms, *waves])])
         found = find_law(rows, lambda split, _: rows.folds(split), grids, rows.floor)
         if found is None:
             return None

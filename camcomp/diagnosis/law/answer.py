@@ -18,7 +18,7 @@ from camcomp.diagnosis.law.smooth import find_map
 from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.result.types import Law
 from camcomp.diagnosis.search.unknown import about, firm_prior
-from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, temperature_of, total
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats
@@ -162,9 +162,11 @@ def with_law(problem: Problem, bench: TermBench, found: FoundLaw) -> Problem:
         np.concatenate([old.sign, np.zeros(more)]),
         np.concatenate([old.reach, np.full(more, np.inf)]),
     )
-    own = [bench.channels(t.spot, bench.values(t.spot, t.form)) for t in found.terms]
+    values = [bench.values(t.spot, t.form) for t in found.terms]
     blocks = tuple(
-        block.appended(channel_behind_channel(np.concatenate([each[k] for each in own], axis=2)))
+        ByChannel.joined(
+            [block, *(bench.reached(t.spot, k, own[k]) for t, own in zip(found.terms, values, strict=True))]
+        )
         for k, block in enumerate(problem.columns.blocks)
     )
     columns = replace(
@@ -174,10 +176,7 @@ def with_law(problem: Problem, bench: TermBench, found: FoundLaw) -> Problem:
         prior=prior,
         blocks=blocks,
     )
-    white = [
-        W.appended(np.concatenate([x.over(k, 0, len(W)) for x in found.columns], axis=1))
-        for k, W in enumerate(problem.white)
-    ]
+    white = [ByChannel.joined([W, *(x[k] for x in found.columns)]) for k, W in enumerate(problem.white)]
     return replace(problem, columns=columns, white=white)
 
 

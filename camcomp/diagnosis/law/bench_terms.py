@@ -10,10 +10,11 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, means, thinned
-from camcomp.diagnosis.law.folds import White
+from camcomp.diagnosis.law.folds import RunColumns
 from camcomp.diagnosis.law.forms import Form, Sizes, SmoothForm, sizes
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.noise_model import Noise
-from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Load
 from camcomp.model.law.covariates import DriveRows, TipRows
 from camcomp.model.law.expression import parse
@@ -81,12 +82,8 @@ class TermRows(ABC):
         """By how much each of functions (n, f) at a spot moves the channels (f,), per unit of its coefficient: over all rows."""
 
     @abstractmethod
-    def white(self, spot: Spot, values: Sequence[Floats]) -> White:
-        """Functions (n, f) per run as white columns of the channels that the spot reaches."""
-
-    @abstractmethod
-    def white_rows(self, spot: Spot) -> int:
-        """How many white rows of all runs the spot reaches."""
+    def white(self, spot: Spot, values: Sequence[Floats]) -> RunColumns:
+        """Functions (n, f) per run as white columns."""
 
     @abstractmethod
     def shown(self, spot: Spot) -> Sequence[Floats]:
@@ -189,20 +186,6 @@ class TermBench(TermRows):
         run = self.bench.runs[k]
         return run.by == "setpoint" and run.measured.has("encoder")
 
-    @cached_property
-    def _slices(self) -> list[dict[int, Ints]]:
-        """Per run: the white rows of every channel."""
-        out = []
-        for k, inflate in enumerate(self.inflate):
-            at, found = 0, {}
-            for c in range(inflate.shape[1]):
-                count = int(np.isfinite(inflate[:, c]).sum())
-                if count and np.isfinite(self.noise.sigma[k, c]):
-                    found[c] = np.arange(at, at + count)
-                    at += count
-            out.append(found)
-        return out
-
     def _reach(self, spot: Spot, k: int) -> tuple[list[int], Floats]:
         """The channels that a spot reaches in run k, and by how much (c, n) each moves per unit at the spot."""
         if (spot, k) not in self._reaches:
@@ -217,53 +200,27 @@ class TermBench(TermRows):
                 self._reaches[spot, k] = moved.tolist(), ways[moved]
         return self._reaches[spot, k]
 
-    def _reached(self, spot: Spot, k: int, values: Floats) -> dict[int, Floats]:
-        """Functions (n, f) of run k in the channels that the spot reaches, thinned: (n', f) each."""
+    def reached(self, spot: Spot, k: int, values: Floats) -> ByChannel:
+        """Functions (n, f) of run k in all of its channels, n' rows each, thinned."""
+        run, every = self.bench.runs[k], np.arange(values.shape[1])
         channels, ways = self._reach(spot, k)
-        return dict(zip(channels, means(values, ways, self.bench.runs[k].thin), strict=True))
+        moved = dict(zip(channels, means(values, ways, run.thin), strict=True))
+        none = every[:0], np.zeros((len(values) // run.thin, 0))
+        parts = [(every, moved[c]) if c in moved else none for c in range(self.inflate[k].shape[1])]
+        return ByChannel(len(every), tuple(parts))
 
-    def white_rows(self, spot: Spot) -> int:
-        """How many white rows of all runs the spot reaches."""
-        return sum(len(own.get(c, ())) for k, own in enumerate(self._slices) for c in self._reach(spot, k)[0])
-
-    def seen(self, spot: Spot) -> list[Bools]:
-        """Rows (n',) per run, thinned, in which some channel that the spot reaches is known."""
-        return [
-            np.asarray(np.isfinite(inflate[:, self._reach(spot, k)[0]]).any(axis=1))
-            for k, inflate in enumerate(self.inflate)
-        ]
+    def white(self, spot: Spot, values: Sequence[Floats]) -> RunColumns:
+        """Functions (n, f) per run as white columns of the channels that the spot reaches."""
+        every = enumerate(zip(values, self.inflate, self.times, strict=True))
+        return [self.noise.by_channel(k, self.reached(spot, k, v), own, t) for k, (v, own, t) in every]
 
     def shown(self, spot: Spot) -> list[Floats]:
-        """Instants per run, on the common clock, of rows that show what happens at a spot."""
-        every = zip(self.bench.runs, self.times, self.seen(spot), strict=True)
-        return [run.run_path.started + t[seen] for run, t, seen in every]
-
-    def channels(self, spot: Spot, values: Sequence[Floats]) -> list[Floats]:
-        """Functions (n, f) per run as changes of all channels, thinned: (n', c, f)."""
+        """Instants per run, on the common clock, of rows in which some channel that the spot reaches is known."""
         out = []
-        for k, v in enumerate(values):
-            every = np.zeros((len(self.times[k]), self.inflate[k].shape[1], v.shape[1]))
-            for c, each in self._reached(spot, k, v).items():
-                every[:, c] = each
-            out.append(every)
+        for k, (run, t, inflate) in enumerate(zip(self.bench.runs, self.times, self.inflate, strict=True)):
+            seen = np.isfinite(inflate[:, self._reach(spot, k)[0]]).any(axis=1)
+            out.append(run.run_path.started + t[seen])
         return out
-
-    def white(self, spot: Spot, values: Sequence[Floats]) -> White:
-        """Functions (n, f) per run as white columns of the channels that the spot reaches."""
-        rows, columns = [], []
-        for k, v in enumerate(values):
-            found = [
-                (self._slices[k][c], self.noise.rows(k, each[:, None, :], self.inflate[k], self.times[k], c))
-                for c, each in self._reached(spot, k, v).items()
-                if c in self._slices[k]
-            ]
-            if len(found) == 1:  # nothing has to be copied then
-                rows.append(found[0][0])
-                columns.append(found[0][1])
-                continue
-            rows.append(np.concatenate([r for r, _ in found]) if found else np.zeros(0, int))
-            columns.append(np.concatenate([x for _, x in found]) if found else np.zeros((0, v.shape[1])))
-        return White(tuple(rows), tuple(columns))
 
 
 def _functions(form: Form | SmoothForm, known: Mapping[str, object]) -> Callable[[Mapping[str, Floats], int], Floats]:

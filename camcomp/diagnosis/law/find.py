@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermRows
-from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, White, gains, usual_split, withheld
+from camcomp.diagnosis.law.folds import ALTERNATING, Folds, RunColumns, Split, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.screen import Screen, TermGrid
 from camcomp.diagnosis.law.shapes import Shapes
@@ -37,7 +37,7 @@ class FoundLaw:
 
     terms: tuple[Term, ...]
     folds: Folds
-    columns: tuple[White, ...]
+    columns: tuple[RunColumns, ...]
     precision: Floats
     alike: tuple[tuple[Term, ...], ...] = ()
 
@@ -93,7 +93,7 @@ class _Search:
         self.base, self.split = base, usual_split(len(bench.row_counts))
         self.folds = base(self.split, True)
         self.bench, self.grids, self.floor_mm = bench, grids, floor_mm
-        self.screen = Screen(grids, self.folds)
+        self.screen = Screen(bench, grids, self.folds)
         self.shapes = Shapes(bench)
         self.per_term = float(np.log(len({Term(s, f).kind for grid in grids for s in grid.spots for f in grid.forms})))
 

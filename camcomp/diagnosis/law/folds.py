@@ -17,34 +17,7 @@ from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats, Ints
 
 PARTS = 4  # that are withheld: runs, or stretches of fewer runs
-
-
-@dataclass(frozen=True, eq=False)
-class White:
-    """Per run: which white rows a spot reaches (r,), in their order, and columns (r, k) there."""
-
-    rows: tuple[Ints, ...]
-    columns: tuple[Floats, ...]
-
-    def hull(self, run: int) -> tuple[int, int]:
-        """The first white row that is reached, and the one behind the last."""
-        rows = self.rows[run]
-        return (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (0, 0)
-
-    def reach(self, run: int) -> Ints | slice:
-        """The rows, as a slice where none lies between them: nothing has to be copied then."""
-        low, high = self.hull(run)
-        return slice(low, high) if high - low == len(self.rows[run]) else self.rows[run]
-
-    def over(self, run: int, low: int, high: int) -> Floats:
-        """Columns (high - low, k) over white rows low to high, 0 where the spot does not reach."""
-        rows, columns = self.rows[run], self.columns[run]
-        if (low, high) == self.hull(run) and len(rows) == high - low:
-            return columns
-        out = np.zeros((high - low, columns.shape[1]))
-        near = (rows >= low) & (rows < high)
-        out[rows[near] - low] = columns[near]
-        return out
+RunColumns = Sequence[ByChannel]  # white columns (w, f) of every run
 
 
 @dataclass(frozen=True)
@@ -87,39 +60,39 @@ class Products:
 class Folds:
     """The base of a law search: white columns and residual beside which laws are sought.
 
-    Columns of all rows are those of the diagnosis and never copied; constants and laws reach some rows only, and stand apart.
+    The columns of the diagnosis are never copied; constants and laws are kept apart from them.
     """
 
     def __init__(
-        self, white: Sequence[ByChannel], residual: Sequence[Floats], precision: Floats, places: Sequence[Floats],
-        split: Split, constants: Sequence[White],
+        self, white: RunColumns, residual: Sequence[Floats], precision: Floats, places: Sequence[Floats], split: Split,
+        constants: Sequence[RunColumns],
     ) -> None:  # fmt: skip
         """White (w, k), residual (w,) per run; precision (k,) of the prior; places (w,) 0 to 1 of white rows in the time of their
         run; constants: columns that are free beside the law.
         """
         self.white, self.residual, self.split = list(white), list(residual), split
-        self.more: tuple[White, ...] = ()
+        self.more: tuple[RunColumns, ...] = ()
         self.precision = precision
-        # a run and its white rows, None for all of them
-        self.parts: list[tuple[int, Ints | None]] = [
-            (k, None if split.parts == 1 else np.flatnonzero(split.of(own) == i))
+        # a run and its white rows
+        self.parts: list[tuple[int, Ints | slice]] = [
+            (k, slice(None) if split.parts == 1 else np.flatnonzero(split.of(own) == i))
             for k, own in enumerate(places)
             for i in range(split.parts)
         ]
         self._grams = [self._gram(k, rows) for k, rows in self.parts]
         if constants:
-            loose = np.full(sum(each.columns[0].shape[1] for each in constants), 1e-6)
+            loose = np.full(sum(each[0].width for each in constants), 1e-6)
             self._put(constants, loose)
         self._factorise()
 
-    def extended(self, more: Sequence[White], precision: Floats) -> Folds:
+    def extended(self, more: Sequence[RunColumns], precision: Floats) -> Folds:
         """The same with more columns in the base, of that prior precision."""
         out = copy(self)
         out._put(more, precision)
         out._factorise()
         return out
 
-    def _put(self, more: Sequence[White], precision: Floats) -> None:
+    def _put(self, more: Sequence[RunColumns], precision: Floats) -> None:
         grams = []
         for (A, b), (cross, gram, target) in zip(self._grams, self._products(more), strict=True):
             grams.append((np.block([[A, cross], [cross.T, gram]]), np.concatenate([b, target])))
@@ -133,15 +106,15 @@ class Folds:
             for L, b in zip(self._halves, _without_each([b for _, b in self._grams]), strict=True)
         ]
 
-    def _gram(self, k: int, rows: Ints | None) -> tuple[Floats, Floats]:
-        W, r = (self.white[k], self.residual[k]) if rows is None else (self.white[k][rows], self.residual[k][rows])
-        return W.T @ W, W.T @ r
+    def _gram(self, k: int, rows: Ints | slice) -> tuple[Floats, Floats]:
+        W = self.white[k][rows]
+        return W.T @ W, W.T @ self.residual[k][rows]
 
     def _half(self, A: Floats) -> Floats:
         M = A + np.diag(self.precision)
         return np.asarray(np.linalg.cholesky(M + 1e-12 * np.diag(np.diag(M))))
 
-    def means(self, more: Sequence[White], precision: Floats) -> Floats:
+    def means(self, more: Sequence[RunColumns], precision: Floats) -> Floats:
         """Coordinates (f, k) of the base, fitted jointly with law columns of that prior precision: with all data, and
         without each part.
         """
@@ -149,39 +122,33 @@ class Folds:
         found = [solve_triangular(L.T, t, lower=False) for L, t in zip(both._halves, both._targets, strict=True)]
         return np.array(found)[:, : len(self.precision)]
 
-    def coefficients(self, columns: Sequence[White], precision: Floats) -> tuple[Floats, Floats]:
+    def coefficients(self, columns: Sequence[RunColumns], precision: Floats) -> tuple[Floats, Floats]:
         """Those (f, c) of law columns of that prior precision, of all data and without each part, and their covariance (c, c)."""
         G, h = self.together(columns)
         M = G + np.diag(precision)
         each = np.asarray(np.linalg.solve(M, h[..., None])[..., 0], float)
         return each, np.asarray(np.linalg.inv(M[0]), float)
 
-    def products(self, x: White, count: int) -> Products:
+    def products(self, x: RunColumns, count: int) -> Products:
         """Products of columns of a spot with the base: they serve every larger base, too."""
-        target = sum(X.T @ r[x.reach(k)] for k, (X, r) in enumerate(zip(x.columns, self.residual, strict=True)))
-        return Products(self._cross(x), np.asarray(target), _grams(x.columns, count), count, len(self.more))
+        target = np.sum([X.T @ r for X, r in zip(x, self.residual, strict=True)], axis=0)
+        own = _grams([values for each in x for on, values in each.parts if len(on)], count)
+        return Products(self._cross([self.white, *self.more], x), np.asarray(target), own, count, len(self.more))
 
-    def alone(self, x: White, products: Products) -> tuple[Floats, Floats]:
+    def alone(self, x: RunColumns, products: Products) -> tuple[Floats, Floats]:
         """Columns (c) with the base taken out, all data: G (f, count, count) and h (f, count) of those that belong together."""
-        cross = np.concatenate([products.cross, self._cross(x, first=products.more)])
+        cross = np.concatenate([products.cross, self._cross(self.more[products.more :], x)])
         half = solve_triangular(self._halves[0], cross, lower=True)
         h = (products.target - half.T @ self._targets[0]).reshape(-1, products.count)
         return products.own - _grams([half], products.count), h
 
-    def _cross(self, x: White, *, first: int | None = None) -> Floats:
-        """Products (k, c) of the base's columns with columns of a spot: of all, or from number `first` of those that stand apart on."""
-        return np.asarray(np.sum([self._against(k, x, first) for k in range(len(self.white))], axis=0))
+    @staticmethod
+    def _cross(base: Sequence[RunColumns], x: RunColumns) -> Floats:
+        """Products (k, c) of columns of the base with columns of a spot, over all runs."""
+        each = [np.sum([W.T @ X for W, X in zip(own, x, strict=True)], axis=0) for own in base]
+        return np.concatenate([np.zeros((0, x[0].width)), *each])
 
-    def _against(self, k: int, x: White, first: int | None) -> Floats:
-        X, rows = x.columns[k], x.reach(k)
-        parts = [self.white[k][rows].T @ X] if first is None else []
-        low, high = x.hull(k)
-        for each in self.more[first:]:
-            near = each.over(k, low, high)
-            parts.append((near if isinstance(rows, slice) else near[rows - low]).T @ X)
-        return np.concatenate(parts) if parts else np.zeros((0, X.shape[1]))
-
-    def together(self, xs: Sequence[White]) -> tuple[Floats, Floats]:
+    def together(self, xs: Sequence[RunColumns]) -> tuple[Floats, Floats]:
         """Columns (c) of several spots, one behind the other, with the base taken out, for all data and for all but one part
         each: G (f, c, c), h (f, c).
         """
@@ -193,18 +160,13 @@ class Folds:
             h.append(target - half.T @ t)
         return np.array(G), np.array(h)
 
-    def _products(self, xs: Sequence[White]) -> list[tuple[Floats, Floats, Floats]]:
+    def _products(self, xs: Sequence[RunColumns]) -> list[tuple[Floats, Floats, Floats]]:
         """Per part: columns of several spots (c) against the base (k, c), each other (c, c) and the residual (c,)."""
         out = []
         for k, rows in self.parts:
-            ends = [x.hull(k) for x in xs]
-            low, high = min(a for a, _ in ends), max(b for _, b in ends)
-            pick: slice | Ints = slice(low, high) if rows is None else rows[(rows >= low) & (rows < high)]
-            near: slice | Ints = slice(None) if isinstance(pick, slice) else pick - low
-            X = np.concatenate([x.over(k, low, high) for x in xs], axis=1)[near]
-            own = [each.over(k, low, high)[near] for each in self.more]
-            cross = np.concatenate([self.white[k][pick].T @ X, *(each.T @ X for each in own)])
-            out.append((cross, X.T @ X, X.T @ self.residual[k][pick]))
+            X = ByChannel.joined([x[k] for x in xs])[rows]
+            cross = np.concatenate([each[k][rows].T @ X for each in (self.white, *self.more)])
+            out.append((cross, X.T @ X, X.T @ self.residual[k][rows]))
         return out
 
 

@@ -2,49 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, TermRows, spots
-from camcomp.diagnosis.law.folds import Folds, Products, White, gains
+from camcomp.diagnosis.law.folds import Folds, Products, RunColumns, gains
 from camcomp.diagnosis.law.forms import Form, at_drive, at_tip
 from camcomp.ground.datatypes import Floats
 
-KEPT_BYTES = 400e6  # of white columns of all grids together; more are worked out anew at every step
-Part = tuple[tuple[Form, ...], list[tuple[White, Floats]]]
+KEPT_BYTES = 400e6  # of white columns that are kept; more are worked out anew at every step
+Columns = list[tuple[RunColumns, Floats]]  # of some forms, with their prior precisions, at every spot
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True)
 class TermGrid:
-    """Forms of as many functions each that are tried at spots with the same covariates; `at_once` of them are evaluated together.
+    """Forms of as many functions each that are tried at spots with the same covariates."""
 
-    keep: whether there is room for their white columns.
-    """
-
-    bench: TermRows
     spots: tuple[Spot, ...]
     forms: tuple[Form, ...]
-    at_once: int
-    keep: bool
-    _kept: list[Part] = field(default_factory=list, init=False, repr=False)
-
-    def parts(self) -> Iterator[Part]:
-        """Some forms after the other, with their white columns and prior precisions at every spot."""
-        if self._kept:
-            yield from self._kept
-            return
-        kept = []
-        for i in range(0, len(self.forms), self.at_once):
-            some = self.forms[i : i + self.at_once]
-            values = self.bench.values(self.spots[0], *some)
-            part = (
-                some,
-                [(self.bench.white(s, values), self.bench.precision(s, values, some[0].size)) for s in self.spots],
-            )
-            if self.keep:
-                kept.append(part)
-            yield part
-        self._kept.extend(kept)
 
 
 def term_grids(bench: TermBench, kind: str) -> list[TermGrid]:
@@ -52,22 +27,16 @@ def term_grids(bench: TermBench, kind: str) -> list[TermGrid]:
     every = spots(len(bench.bench.actuators), kind)
     tip = tuple(each for each in every if each.on == "structure")
     groups = [each for each in (tip, *((each,) for each in every if each not in tip)) if each]
-    return grids_of(bench, [(where, _forms(bench, where[0])) for where in groups])
+    return grids_of([(where, _forms(bench, where[0])) for where in groups])
 
 
-def grids_of(bench: TermRows, tried: Sequence[tuple[tuple[Spot, ...], Sequence[Form]]]) -> list[TermGrid]:
+def grids_of(tried: Sequence[tuple[tuple[Spot, ...], Sequence[Form]]]) -> list[TermGrid]:
     """Grids of forms that are tried at spots with the same covariates."""
-    pairs = [(where, some) for where, forms in tried for some in _by_count(forms)]
-    size = sum(8.0 * sum(map(bench.white_rows, where)) * len(some) * some[0].size for where, some in pairs)
     return [
-        TermGrid(bench=bench, spots=where, forms=some, at_once=bench.at_once, keep=size < KEPT_BYTES)
-        for where, some in pairs
+        TermGrid(where, tuple(f for f in forms if f.size == count))
+        for where, forms in tried
+        for count in sorted({f.size for f in forms})
     ]
-
-
-def _by_count(forms: Sequence[Form]) -> list[tuple[Form, ...]]:
-    """Forms of one function, of two functions, and so on."""
-    return [tuple(f for f in forms if f.size == count) for count in sorted({f.size for f in forms})]
 
 
 def _forms(bench: TermBench, spot: Spot) -> Sequence[Form]:
@@ -80,19 +49,35 @@ def _forms(bench: TermBench, spot: Spot) -> Sequence[Form]:
 class Screen:
     """Gains of all terms of the grids in addition to a base of a law search, and to that base with terms in it."""
 
-    def __init__(self, grids: Sequence[TermGrid], base: Folds) -> None:
-        self.grids, self.base = grids, base
+    def __init__(self, bench: TermRows, grids: Sequence[TermGrid], base: Folds) -> None:
+        self.bench, self.grids, self.base = bench, grids, base
+        self._room = KEPT_BYTES
+        self._kept: dict[Term, Columns] = {}
         self._products: dict[Term, Products] = {}
 
     def gains(self, step: Folds) -> list[tuple[float, Term]]:
         """(gain in evidence, term) of all terms in addition to the base, best first."""
         out: list[tuple[float, Term]] = []
         for grid in self.grids:
-            for forms, columns in grid.parts():
-                for spot, (white, precision) in zip(grid.spots, columns, strict=True):
-                    key = Term(spot, forms[0])  # of the same products at every step
+            for i in range(0, len(grid.forms), self.bench.at_once):
+                some = grid.forms[i : i + self.bench.at_once]
+                for spot, (white, precision) in zip(grid.spots, self._columns(grid.spots, some), strict=True):
+                    key = Term(spot, some[0])  # of the same products at every step
                     if key not in self._products:
-                        self._products[key] = self.base.products(white, grid.forms[0].size)
+                        self._products[key] = self.base.products(white, some[0].size)
                     gain = gains(*step.alone(white, self._products[key]), precision)
-                    out += [(float(g), Term(spot, form)) for g, form in zip(gain, forms, strict=True)]
+                    out += [(float(g), Term(spot, form)) for g, form in zip(gain, some, strict=True)]
         return sorted(out, key=lambda each: -each[0])
+
+    def _columns(self, where: Sequence[Spot], forms: Sequence[Form]) -> Columns:
+        """White columns and prior precisions of forms at every spot; kept as long as there is room."""
+        key = Term(where[0], forms[0])
+        if key in self._kept:
+            return self._kept[key]
+        values = self.bench.values(where[0], *forms)
+        out: Columns = [(self.bench.white(s, values), self.bench.precision(s, values, forms[0].size)) for s in where]
+        size = sum(X.nbytes for white, _ in out for each in white for _, X in each.parts)
+        if size <= self._room:
+            self._room -= size
+            self._kept[key] = out
+        return out

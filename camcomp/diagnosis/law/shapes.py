@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermRows
-from camcomp.diagnosis.law.folds import Folds, White, gains
+from camcomp.diagnosis.law.folds import Folds, RunColumns, gains
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.ground.datatypes import Floats
 
@@ -22,15 +22,15 @@ class Shapes:
 
     def __init__(self, bench: TermRows) -> None:
         self.bench = bench
-        self._seen: dict[Term, tuple[White, Floats]] = {}
+        self._seen: dict[Term, tuple[RunColumns, Floats]] = {}
 
-    def columns(self, term: Term) -> tuple[White, Floats]:
+    def columns(self, term: Term) -> tuple[RunColumns, Floats]:
         """White columns of a term, and their prior precision (f,): WIDE_MM at the tip, or the width of a smooth map."""
         if term not in self._seen:
             self._seen[term] = self._worked_out(term)
         return self._seen[term]
 
-    def _worked_out(self, term: Term) -> tuple[White, Floats]:
+    def _worked_out(self, term: Term) -> tuple[RunColumns, Floats]:
         values = self.bench.values(term.spot, term.form)
         if isinstance(term.form, SmoothForm):
             precision = np.full(term.form.size, term.form.width**-2.0)

@@ -29,6 +29,15 @@ class ByChannel:
         every = list(channels)
         return cls(every[0].shape[1], tuple(_not_zero(np.arange(each.shape[1]), each) for each in every))
 
+    @classmethod
+    def joined(cls, matrices: Sequence[ByChannel]) -> ByChannel:
+        """Matrices of the same rows, one behind the other."""
+        first, parts = np.cumsum([0, *(each.width for each in matrices)]), []
+        for channel in zip(*(each.parts for each in matrices), strict=True):
+            on = np.concatenate([own + at for at, (own, _) in zip(first, channel, strict=False)])
+            parts.append((on, np.concatenate([X for _, X in channel], axis=1)))
+        return cls(int(first[-1]), tuple(parts))
+
     @cached_property
     def _starts(self) -> list[int]:
         return [int(n) for n in np.cumsum([0, *(len(X) for _, X in self.parts)])]

@@ -6,7 +6,7 @@ from scipy.stats import multivariate_normal
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term
 from camcomp.diagnosis.law.find import margin, unlikely
-from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, White, _grams, gains, usual_split, withheld
+from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, _grams, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import Sizes, at_drive, at_tip
 from camcomp.diagnosis.law.library import LearnedLaw, keep, learned
 from camcomp.diagnosis.result.types import Law, LawPart, LawTerm
@@ -60,7 +60,7 @@ def test_what_stands_beside_a_law_gives_way_to_it():
     residual = 3.0 * law[:, 0] + 0.1 * rng.normal(size=400)
     folds = Folds([ByChannel.of([known])], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
     alone = float(known[:, 0] @ residual / (known[:, 0] @ known[:, 0]))
-    beside = folds.means([White((np.arange(400),), (law,))], np.array([1e-4]))
+    beside = folds.means([[ByChannel.of([law])]], np.array([1e-4]))
     assert alone > 1.0 and beside.shape == (3, 1) and np.abs(beside).max() < 0.02
 
 
@@ -70,7 +70,7 @@ def test_what_is_withheld_has_no_say():
     residual = 2.0 * known[:, 0] + 3.0 * law[:, 0]
     residual[:200] *= -1.0
     folds = Folds([ByChannel.of([known])], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
-    columns, prior = [White((np.arange(400),), (law,))], np.array([1e-4])
+    columns, prior = [[ByChannel.of([law])]], np.array([1e-4])
     assert folds.means(columns, prior)[1:, 0] == pytest.approx([2.0, -2.0], abs=1e-3)
     each, covariance = folds.coefficients(columns, prior)
     assert each[1:, 0] == pytest.approx([3.0, -3.0], abs=1e-3)
