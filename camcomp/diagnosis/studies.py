@@ -22,8 +22,9 @@ from camcomp.diagnosis.arm.study import studied as study_arm
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
 from camcomp.diagnosis.axis.plausible import check_axes
-from camcomp.diagnosis.axis.predicted import predict_drives, predict_encoders, predict_loads
+from camcomp.diagnosis.axis.predicted import without_effects
 from camcomp.diagnosis.axis.study import studied as study_axes
+from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.experiment.log_checks import check_clock
 from camcomp.diagnosis.experiment.open_experiment import open_log, read_log, unread
 from camcomp.diagnosis.fit.measured import Measured
@@ -61,13 +62,13 @@ def study_of(file: str | Path | ExperimentFile, without: Sequence[str] = ()) -> 
     Raises ConfigError CC420 where the logs say too little, CC407, CC408, CC412, CC413 where they cannot be of this machine
     as they are read.
     """
-    opened = _open(read_experiment(file))
+    opened = open_logs(read_experiment(file))
     logs, robot = opened.logs, opened.robot
     try:
         if all(m.has("tip") and m.has("encoder") and not m.has("setpoint") for m in logs):
             if arm_of(robot) is None:
                 return None
-            runs = _checked_poses(opened)
+            runs = checked_poses(opened)
             sd = opened.file.experiment.sd
             stated = StatedDeviation(sd.tip_mm, sd.encoder_mm) if sd else StatedDeviation()
             own = _causes(opened.file.config)
@@ -76,7 +77,7 @@ def study_of(file: str | Path | ExperimentFile, without: Sequence[str] = ()) -> 
             bench = partial(bench_of, robot, tuple(own), runs, holdout)
             return LogStudy(result, partial(of_poses, bench, result), (*opened.notes, *notes))
         if not any(m.has("tip") for m in logs) and all(m.has("encoder") for m in logs):
-            axes = _checked_axes(opened)
+            axes = checked_axes(opened)
             sd = opened.file.experiment.sd
             deviation = (
                 AxisDeviation(sd.encoder_mm, sd.force_N, sd.encoder_rad, sd.force_Nmm) if sd else AxisDeviation()
@@ -99,7 +100,7 @@ def study_of(file: str | Path | ExperimentFile, without: Sequence[str] = ()) -> 
     return None
 
 
-def _without_masses(opened: _Opened) -> tuple[str, ...]:
+def _without_masses(opened: OpenedLogs) -> tuple[str, ...]:
     """Note for the reader where torques or second encoders of an arm show weight and the machine file states no
     mass.
     """
@@ -112,7 +113,7 @@ def _without_masses(opened: _Opened) -> tuple[str, ...]:
     )
 
 
-def _channels_there(opened: _Opened) -> str:
+def _channels_there(opened: OpenedLogs) -> str:
     """The channels that the logs hold, with their actuators and the rows of the longest, for a message."""
     actuators = [a.name for a in opened.robot.actuators]
     parts = []
@@ -125,7 +126,7 @@ def _channels_there(opened: _Opened) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class _Opened:
+class OpenedLogs:
     """An experiment whose runs have no program: its files, a log per run, and notes for the reader."""
 
     file: ExperimentFile
@@ -134,49 +135,35 @@ class _Opened:
     notes: list[str]
 
 
-def _open(file: ExperimentFile) -> _Opened:
+def open_logs(file: ExperimentFile) -> OpenedLogs:
+    """The logs of an experiment without programs."""
     experiment, config = file.experiment, file.config
     robot, _ = build_robot(config.robot, config.tool.tip)
     columns = log_columns([a.name for a in robot.actuators], [a.revolute for a in robot.actuators])
     tables = [open_log(run.log) for run in experiment.runs]
     notes = [note for table in tables for note in unread(table, columns)]
-    return _Opened(file, robot, [read_log(table, columns) for table in tables], notes)
+    return OpenedLogs(file, robot, [read_log(table, columns) for table in tables], notes)
 
 
-def open_axes(file: str | Path | ExperimentFile) -> dict[str, list[AxisRun]]:
-    """Runs of every axis by name, of an experiment whose logs have no tip. Raises ConfigError CC407, CC408."""
-    return _checked_axes(_open(read_experiment(file)))
-
-
-def open_poses(file: str | Path | ExperimentFile) -> list[Poses]:
-    """Static poses of every run. Raises ConfigError CC407, CC408, CC412, CC413."""
-    return _checked_poses(_open(read_experiment(file)))
-
-
-def _checked_axes(opened: _Opened) -> dict[str, list[AxisRun]]:
+def checked_axes(opened: OpenedLogs) -> dict[str, list[AxisRun]]:
+    """Runs of every axis by name, of logs without a tip. Raises ConfigError CC407, CC408."""
     robot, causes = opened.robot, _causes(opened.file.config)
     runs = list(zip(opened.file.experiment.runs, opened.logs, strict=True))
     for run, log in runs:
         check_clock(display_name(run.log), log)
-    late = [predict_encoders(robot, causes, log, run.started_s) for run, log in runs]
-    logs = [
-        replace(
-            log,
-            drive=log.drive - predict_drives(robot, causes, log, run.started_s),
-            load=log.load - predict_loads(robot, causes, log, run.started_s),
-        )
-        for run, log in runs
-    ]
+    axes = {a.name: [_axis(run, log, k, a.revolute) for run, log in runs] for k, a in enumerate(robot.actuators)}
+    around, logs = AxisSurroundings(robot, axes), opened.logs
     axes = {
-        a.name: [_axis(run, log, k, a.revolute, own[:, k]) for (run, _), log, own in zip(runs, logs, late, strict=True)]
-        for k, a in enumerate(robot.actuators)
+        name: [without_effects(around, name, one, causes, log) for one, log in zip(own, logs, strict=True)]
+        for name, own in axes.items()
     }
     for i, (run, _) in enumerate(runs):
         check_axes(display_name(run.log), {name: own[i] for name, own in axes.items()}, run.cutting)
     return axes
 
 
-def _checked_poses(opened: _Opened) -> list[Poses]:
+def checked_poses(opened: OpenedLogs) -> list[Poses]:
+    """Static poses of every run. Raises ConfigError CC407, CC408, CC412, CC413."""
     runs = [_poses(run, log) for run, log in zip(opened.file.experiment.runs, opened.logs, strict=True)]
     for run, each in zip(opened.file.experiment.runs, runs, strict=True):
         opened.notes.extend(check_poses(display_name(run.log), run.name, opened.robot, each.q, each.tip))
@@ -225,12 +212,11 @@ def _filled(time: Floats, values: Floats) -> Floats | None:
     return np.where(known, values, np.interp(time, time[order], values[order]))
 
 
-def _axis(run: RunSpec, log: Measured, k: int, revolute: bool, expected: Floats) -> AxisRun:
+def _axis(run: RunSpec, log: Measured, k: int, revolute: bool) -> AxisRun:
     """Rows, one per time and in its order, with all that the log has of this axis; ways and torques of hinges at the end of their arm."""
     lever = lever_mm(revolute)
-    expected = lever * expected
     channels = (lever * log.encoder[:, k], lever * log.setpoint[:, k], log.drive[:, k] / lever, lever * log.load[:, k])
-    known = np.isfinite(log.encoder[:, k]) & np.isfinite(expected)
+    known = np.isfinite(log.encoder[:, k])
     for each in channels:
         if np.isfinite(each).mean() > 0.5:
             known &= np.isfinite(each)
@@ -239,6 +225,5 @@ def _axis(run: RunSpec, log: Measured, k: int, revolute: bool, expected: Floats)
     encoder, setpoint, force, load = (each[rows] for each in channels)
     return AxisRun(
         name=run.name, time=log.time[rows], setpoint=setpoint, encoder=encoder, force=force, row=rows + 1,
-        revolute=revolute, started=run.started_s, expected=expected[rows] if expected[rows].any() else None,
-        load=load if np.isfinite(load).all() else None,
+        revolute=revolute, started=run.started_s, load=load if np.isfinite(load).all() else None,
     )  # fmt: skip

@@ -9,8 +9,9 @@ import pytest
 import yaml
 
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
-from camcomp.diagnosis.studies import open_axes, open_poses
+from camcomp.diagnosis.studies import checked_axes, checked_poses, open_logs
 from camcomp.ground.errors import ConfigError
+from camcomp.model.config.load import read_experiment
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT, table
 
@@ -62,13 +63,14 @@ def check_every_kind(folder, machine, number):
     configs, program = found
     open_experiment(experiment(folder, configs, lambda name: True, program=str(program), cutting=True))
     of_control = ("cmd_", "act_", "t_s")
-    open_axes(experiment(folder, configs, lambda name: name.startswith(of_control), cutting=True))
+    alone = experiment(folder, configs, lambda name: name.startswith(of_control), cutting=True)
+    checked_axes(open_logs(read_experiment(alone)))
     if machine in ARMS:
         simulated(folder, machine, number, str(ROOT / "config/no-force.yaml"))
         static = experiment(
             folder, configs, lambda name: name.startswith(("act_", "t_s")) or name in TIP, cutting=False
         )
-        open_poses(static)
+        checked_poses(open_logs(read_experiment(static)))
     return True
 
 

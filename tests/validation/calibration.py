@@ -10,19 +10,23 @@ from __future__ import annotations
 import json
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
 
+import numpy as np
+
 import camcomp
 from camcomp.diagnosis.arm.answer import POSES_MAP, UNKNOWN_MAP
-from camcomp.diagnosis.model.calibration import CalibrationMap, fit_map
+from camcomp.diagnosis.model.calibration import MOST_LOG_ODDS, CalibrationMap
 from tests.validation import scoring
 from tests.validation.generators import FOR_GENERATORS
 from tests.validation.recordings import recording
 
+LEAST_PER_LEVEL = 20  # causes of one level of the map: a rate known to a tenth
+BELOW = 8  # log odds: knots of the map where no experiment was, one each
 SHAPES = 50.0  # half widths: intervals of scanned shapes have next to no width, and no factor mends them
 FIRST = 90_000  # development seeds; the bench draws its seeds from 10 000 000 on
 STORED = Path(camcomp.__file__).parent / "data" / "calibration.json"
@@ -111,3 +115,33 @@ def store(kind: str, file: Path) -> None:
 
 def _read(file: Path) -> list[dict]:
     return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+
+
+def fit_map(probability: Sequence[float], right: Sequence[bool], misses: Sequence[float]) -> CalibrationMap:
+    """The map that makes stated probabilities come true: pool adjacent violators, levels of LEAST_PER_LEVEL and more (Zadrozny, Elkan, KDD 2002).
+
+    misses: |value - truth| in half widths of 95 % intervals, of parameters that were named; their 95 % quantile is the
+    factor on half widths.
+    """
+    p = np.clip(np.array(probability, float), 1e-12, 1.0 - 1e-12)
+    odds = np.clip(np.log(p / (1.0 - p)), -MOST_LOG_ODDS, MOST_LOG_ODDS)
+    order = np.argsort(odds, kind="stable")
+    levels = [[odds[i], float(right[i]), 1.0] for i in order]
+    pooled: list[list[float]] = []
+    for level in levels:
+        pooled.append(level)
+        while len(pooled) > 1 and (
+            pooled[-2][1] / pooled[-2][2] >= pooled[-1][1] / pooled[-1][2] or pooled[-2][2] < LEAST_PER_LEVEL
+        ):
+            last = pooled.pop()
+            own = pooled[-1]
+            weight = own[2] + last[2]
+            pooled[-1] = [(own[0] * own[2] + last[0] * last[2]) / weight, own[1] + last[1], weight]
+    knots = np.array([[o, (r + 0.5) / (n + 1.0)] for o, r, n in pooled])
+    if knots[0, 0] > 0.0:  # below even odds nothing was seen: the posterior as it is, below the first level
+        odds = np.linspace(-BELOW, 0.0, BELOW + 1)
+        knots = np.vstack([np.column_stack([odds, 2.0 * min(knots[0, 1], 0.5) / (1.0 + np.exp(-odds))]), knots])
+    factor = max(float(np.quantile(misses, 0.95)), 1.0) if len(misses) >= LEAST_PER_LEVEL else 1.0
+    return CalibrationMap(
+        tuple(knots[:, 0].tolist()), tuple(np.maximum.accumulate(knots[:, 1]).tolist()), round(factor, 3)
+    )

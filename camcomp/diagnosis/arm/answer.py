@@ -12,7 +12,7 @@ from scipy.special import expit
 from scipy.stats import norm
 
 from camcomp.diagnosis.arm.case import PoseCase
-from camcomp.diagnosis.arm.curves import curve_of
+from camcomp.diagnosis.arm.curves import curve_cause
 from camcomp.diagnosis.arm.linear import covariate_of
 from camcomp.diagnosis.arm.noise_floor import TipFloor
 from camcomp.diagnosis.arm.poses import CURVE
@@ -27,9 +27,7 @@ from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.model.verdict import VerdictInputs, decide
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
-    CurveCause,
     Driver,
-    ErrorCurve,
     Estimate,
     FoundCause,
     GapSize,
@@ -39,7 +37,6 @@ from camcomp.diagnosis.result.types import (
     PlaceShare,
     UnknownCause,
     Where,
-    six_digits,
 )
 from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
@@ -77,6 +74,11 @@ class AnswerInputs:
     def kind(self) -> str:
         """The calibration map of causes."""
         return UNKNOWN_MAP if self.unmodelled > EVEN else POSES_MAP
+
+    @property
+    def wide(self) -> float:
+        """Half width of a 95 % interval in standard deviations."""
+        return 1.96 * calibration_of(self.kind).interval
 
     @cached_property
     def rest(self) -> list[Floats]:
@@ -141,7 +143,13 @@ def causes(told: AnswerInputs) -> tuple[tuple[FoundCause, ...], tuple[MinorEffec
             share=round(min(energy / whole, 1.0), 4),
             parameters=parameters_of(told, part.columns),
         )
-        out.append(cause if part.effect != CURVE else _curve(told, cause, part.columns))
+        if part.effect == CURVE:
+            on, case = part.columns, told.case
+            columns, covariance = [case.shelf.columns[j] for j in on], case.covariance[np.ix_(on, on)]
+            cause = curve_cause(
+                case.bench, cause, columns, amount=case.amount[on], covariance=covariance, wide=told.wide
+            )
+        out.append(cause)
     out.sort(key=lambda c: (-c.probability, -c.share))
     return tuple(out), tuple(minor)
 
@@ -173,43 +181,13 @@ def energy_of(told: AnswerInputs, on: Sequence[int]) -> float:
 def parameters_of(told: AnswerInputs, on: Sequence[int]) -> dict[str, Estimate]:
     """Parameters of columns with their intervals."""
     out = {}
-    wide = 1.96 * calibration_of(told.kind).interval
     for j in on:
         column = told.case.shelf.columns[j]
-        p, spread = column.parameter, wide * float(np.sqrt(told.case.covariance[j, j]))
+        p, spread = column.parameter, told.wide * float(np.sqrt(told.case.covariance[j, j]))
         low, value, high = (p.value((told.case.amount[j] + s * spread) * p.scale) for s in (-1.0, 0.0, 1.0))
         out[p.name] = Estimate.stated(value, low, high)
         for name, shape, first, last in column.shape:
             out[name] = Estimate.stated(shape, first, last)
-    return out
-
-
-def _curve(told: AnswerInputs, cause: FoundCause, on: Sequence[int]) -> CurveCause:
-    """The cause with the curve of its joint."""
-    case = told.case
-    found = curve_of(case.bench, [case.shelf.columns[j] for j in on], case.amount[on], case.covariance[np.ix_(on, on)])
-    wide = 1.96 * calibration_of(told.kind).interval
-    low, high = (max(found.amplitude + s * wide * found.amplitude_sd, 0.0) for s in (-1.0, 1.0))
-    size = Estimate.stated(found.amplitude, low, high)
-    out = CurveCause(
-        effect=cause.effect,
-        target=cause.target,
-        probability=cause.probability,
-        share=cause.share,
-        parameters={"amplitude_rad": size},
-        curve=ErrorCurve(
-            angle_deg=tuple(found.angle),
-            error_rad=tuple(six_digits(e) for e in found.error),
-            sd_rad=tuple(six_digits(s) for s in found.sd),
-            seen_deg=found.seen,
-            seen_share=round(found.seen_share, 4),
-        ),
-    )
-    lists = {key: value for key, value in found.values.items() if isinstance(value, list)}
-    out._settings = {
-        key: [each if isinstance(each, list) else float(f"{each:.4g}") for each in value]
-        for key, value in lists.items()
-    }
     return out
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from camcomp.diagnosis.arm.poses import ArmBench, Column, combined, wave
+from camcomp.diagnosis.result.types import CurveCause, ErrorCurve, Estimate, FoundCause, six_digits
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Motion
@@ -17,48 +17,39 @@ GAP_DEG = 6.0  # angles closer than this are one interval: less than the shortes
 DRAWN_DEG = 3.0  # step at which a curve is told
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class CurveOfJoint:
-    """The curve of one joint: angles (n,) deg, error and deviation (n,) rad; amplitude with deviation, rad; intervals seen.
+def curve_cause(
+    bench: ArmBench, cause: FoundCause, columns: Sequence[Column], amount: Floats, covariance: Floats, wide: float
+) -> CurveCause:
+    """The cause with the curve of its joint, from waves (k,), their amplitudes (k,) and covariance (k, k).
 
-    values: what the effect has in YAML.
+    wide: half width of a 95 % interval in standard deviations.
     """
-
-    angle: Floats
-    error: Floats
-    sd: Floats
-    amplitude: float
-    amplitude_sd: float
-    seen: tuple[tuple[float, float], ...]
-    values: Mapping[str, Any]
-
-    @property
-    def seen_share(self) -> float:
-        """Share of a turn that was seen."""
-        return min(sum(high - low for low, high in self.seen) / 360.0, 1.0)
-
-
-def curve_of(bench: ArmBench, columns: Sequence[Column], amount: Floats, covariance: Floats) -> CurveOfJoint:
-    """The curve of a joint from its waves (k,), their amplitudes (k,) and covariance (k, k)."""
-    joint = list(bench.actuators).index(str(columns[0].target))
+    joint = list(bench.actuators).index(str(cause.target))
     angle = np.arange(0.0, 360.0, DRAWN_DEG)
     shapes = np.stack([wave(c, np.radians(angle)) for c in columns], axis=1)
-    size = np.array([c.parameter.value(a * c.parameter.scale) for c, a in zip(columns, amount, strict=True)])
+    scale = np.array([c.parameter.scale for c in columns])
+    size = np.array([c.parameter.value(a * s) for c, a, s in zip(columns, amount, scale, strict=True)])
     amplitude = float(np.sqrt(0.5 * np.sum(size**2)))
-    slope = 0.5 * size * np.array([c.parameter.scale for c in columns]) / max(amplitude, 1e-300)
+    slope = 0.5 * size * scale / max(amplitude, 1e-300)
+    half = wide * float(np.sqrt(slope @ covariance @ slope))
     seen = seen_angles(np.concatenate([bench.campaigns[k].q[:, joint] for k in bench.own]))
     sd = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", shapes, covariance, shapes), 0.0))
-    cause = combined(columns, dict(enumerate(amount)))[0]
-    values: dict[str, Any] = {
-        **cause.values,
-        "seen_deg": [list(each) for each in seen],
-        "band_rad": [float(s) for s in sd],
-    }
-    error = _drawn(replace(cause, values=values), np.radians(angle))
-    return CurveOfJoint(
-        angle=angle, error=error, sd=sd, amplitude=amplitude, amplitude_sd=float(np.sqrt(slope @ covariance @ slope)),
-        seen=seen, values=values,
+    found = combined(columns, dict(enumerate(amount)))[0]
+    values = {**found.values, "seen_deg": [list(each) for each in seen], "band_rad": [float(s) for s in sd]}
+    error = _drawn(replace(found, values=values), np.radians(angle))
+    out = CurveCause(
+        effect=cause.effect, target=cause.target, probability=cause.probability, share=cause.share,
+        parameters={"amplitude_rad": Estimate.stated(amplitude, max(amplitude - half, 0.0), amplitude + half)},
+        curve=ErrorCurve(
+            angle_deg=tuple(angle), error_rad=tuple(six_digits(e) for e in error), sd_rad=tuple(six_digits(s) for s in sd),
+            seen_deg=seen, seen_share=round(min(sum(high - low for low, high in seen) / 360.0, 1.0), 4),
+        ),
     )  # fmt: skip
+    out._settings = {
+        key: [each if isinstance(each, list) else float(f"{each:.4g}") for each in value]
+        for key, value in values.items() if isinstance(value, list)
+    }  # fmt: skip
+    return out
 
 
 def seen_angles(angle: Floats) -> tuple[tuple[float, float], ...]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from camcomp.diagnosis.arm.registration import nuisance_columns, register
 from camcomp.diagnosis.fit.outliers import FAR_MM
+from camcomp.diagnosis.model.readings import Reading, refuse_as_read
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.statics.arm import arm_of, jacobian
@@ -17,7 +18,6 @@ from camcomp.model.statics.hanging import hang
 
 NEAR = 0.005  # of the poses' spread: arms as they are bought; below it no other reading is asked for
 FAR = 0.02  # of the spread: no arm of the kind is wrong by so much
-BETTER = 0.2  # of the misfit: what another reading has to leave to be what was meant
 SHIFTS = (1, -1, 2, -2)  # rows
 POSES = 200
 LEAST = 12  # poses; fewer fit anything
@@ -39,9 +39,9 @@ def check_poses(log: str, run: str, robot: Robot, q: Floats, tip: Floats) -> lis
     off = _misfit(point, pose, tip[rows])
     if off < max(NEAR * spread, FAR_MM) or spread <= 0.0:
         return []
-    for rule, text, read in _readings(robot, q, tip, rows):
-        if read() < BETTER * off:
-            raise ConfigError(rule, f"run '{run}': {text}", at=Location(log, 1, 1))
+    refuse_as_read(
+        log, off, [(rule, f"run '{run}': {text}", read) for rule, text, read in _readings(robot, q, tip, rows)]
+    )
     if off <= FAR * spread:
         return []
     text = (
@@ -67,7 +67,7 @@ def _bending(robot: Robot, q: Floats, point: Floats) -> dict[str, Floats]:
     return out
 
 
-def _readings(robot: Robot, q: Floats, tip: Floats, rows: np.ndarray) -> list[tuple[str, str, Callable[[], float]]]:
+def _readings(robot: Robot, q: Floats, tip: Floats, rows: np.ndarray) -> list[Reading]:
     """Rule, description and misfit of every other way to read the poses."""
     names = [a.name for a in robot.actuators]
     hinges = np.array([a.revolute for a in robot.actuators])

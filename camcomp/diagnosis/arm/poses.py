@@ -8,7 +8,7 @@ sensor to say. Nothing cuts, so the drives push nothing but the load.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, partial
 from itertools import pairwise
 from typing import Any
@@ -59,13 +59,30 @@ class Poses:
 
     def take(self, rows: np.ndarray) -> Poses:
         """The poses of a mask or of indices."""
-        heat = None if self.temperature is None else self.temperature[rows]
-        sd = None if self.sd is None else self.sd[rows]
-        way, torque, force = (None if each is None else each[rows] for each in (self.approach, self.torque, self.force))
-        return Poses(
-            label=self.label, q=self.q[rows], tip=self.tip[rows], time=self.time[rows], temperature=heat,
-            run=self.run[rows], sd=sd, row=self.rows[rows], approach=way, torque=torque, force=force,
-        )  # fmt: skip
+        whole = replace(self, row=self.rows)
+        own: dict[str, Any] = {f.name: getattr(whole, f.name) for f in fields(whole) if f.name != "label"}
+        return replace(whole, **{name: each[rows] for name, each in own.items() if each is not None})
+
+    @staticmethod
+    def together(runs: Sequence[Poses]) -> Poses:
+        """Poses of runs of one campaign, one after the other, in order of their joints and without a row twice.
+
+        A temperature has to be known in all runs; what else only some runs have is unknown (0 for approach and force) in
+        the others.
+        """
+        blank = {"sd": np.nan, "torque": np.nan, "approach": 0.0, "force": 0.0, "temperature": np.nan}
+        out: dict[str, Any] = {"row": np.concatenate([r.rows for r in runs])}
+        for name in ("q", "tip", "time", "run", *blank):
+            parts = [getattr(r, name) for r in runs]
+            if all(each is None for each in parts) or (name == "temperature" and any(each is None for each in parts)):
+                continue
+            width = {"approach": runs[0].q.shape[1], "torque": runs[0].q.shape[1]}.get(name, 3)
+            filled = [
+                np.full((len(r.q), width), blank[name]) if p is None else p for r, p in zip(runs, parts, strict=True)
+            ]
+            out[name] = np.concatenate(filled)
+        every = Poses(label=runs[0].label, **{"temperature": None, **out})
+        return every.take(np.unique(np.concatenate([every.q, every.tip], axis=1), axis=0, return_index=True)[1])
 
     @property
     def rows(self) -> np.ndarray:

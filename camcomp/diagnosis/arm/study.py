@@ -237,37 +237,11 @@ def fixes_frame(robot: Robot, poses: Poses) -> bool:
 
 def merged(runs: Sequence[Poses], least: int = LEAST_POSES) -> list[Poses]:
     """One entry per campaign, its poses and the campaigns in an order of their own, and no row twice."""
-    out = []
-    for label in dict.fromkeys(r.label for r in runs):
-        own = [r for r in runs if r.label == label]
-        heats, deviations = [r.temperature for r in own], [r.sd for r in own]
-        heat = None if any(h is None for h in heats) else np.concatenate([h for h in heats if h is not None])
-        sd = np.concatenate([np.full((len(r.q), 3), np.nan) if r.sd is None else r.sd for r in own])
-        q, tip, time, run, row = (
-            np.concatenate([getattr(r, f) for r in own]) for f in ("q", "tip", "time", "run", "rows")
-        )
-        way = np.concatenate([np.zeros_like(r.q) if r.approach is None else r.approach for r in own])
-        torque = np.concatenate([np.full(r.q.shape, np.nan) if r.torque is None else r.torque for r in own])
-        every = Poses(
-            label=label,
-            q=q,
-            tip=tip,
-            time=time,
-            temperature=heat,
-            run=run,
-            sd=None if all(d is None for d in deviations) else sd,
-            row=row,
-            approach=way,
-            torque=None if np.isnan(torque).all() else torque,
-            force=None
-            if all(r.force is None for r in own)
-            else np.concatenate([np.zeros((len(r.q), 3)) if r.force is None else r.force for r in own]),
-        )
-        _, first = np.unique(np.concatenate([q, tip], axis=1), axis=0, return_index=True)  # sorted by joints
-        every = every.take(first)
-        if len(every.q) < least:
-            raise ValueError(f"campaign '{label}' has {len(every.q)} poses; its frames alone need more")
-        out.append(every)
+    labels = dict.fromkeys(r.label for r in runs)
+    out = [Poses.together([r for r in runs if r.label == label]) for label in labels]
+    for each in out:
+        if len(each.q) < least:
+            raise ValueError(f"campaign '{each.label}' has {len(each.q)} poses; its frames alone need more")
     return sorted(out, key=lambda each: tuple(each.q[0]))
 
 

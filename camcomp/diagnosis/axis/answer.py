@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 
 from camcomp.diagnosis.answer.unseen import PARTS, JudgedRun, unseen_shrinkage
-from camcomp.diagnosis.axis.at_tip import TipMotion, held_errors, lever_mm, position_floor, whole_errors
+from camcomp.diagnosis.axis.at_tip import held_errors, lever_mm, position_floor, whole_errors
 from camcomp.diagnosis.axis.findings import AxisFindings
 from camcomp.diagnosis.axis.gate import KNOWN
+from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.result.types import (
     ActuatorGap,
     ActuatorShrinkage,
@@ -47,7 +48,7 @@ def unknown(axis: AxisFindings, whole: int) -> UnknownCause:
     return UnknownCause(target=axis.name, probability=probability, share=share, law=axis.law)
 
 
-def gap(found: Sequence[AxisFindings], tip: TipMotion) -> GapSize:
+def gap(found: Sequence[AxisFindings], tip: AxisSurroundings) -> GapSize:
     """Size of the errors of position at the tip in um, and of every actuator in its own unit; where only forces were logged, of these in mN."""
     errors = whole_errors(found)
     if not errors:
@@ -133,7 +134,7 @@ def _intervals(found: Sequence[AxisFindings]) -> tuple[IntervalShare, ...]:
     return tuple(sorted(every, key=lambda each: -each.share))
 
 
-def shrinkage(judged: Sequence[Sequence[AxisFindings]], names: Sequence[str], tip: TipMotion) -> UnseenShrinkage:
+def shrinkage(judged: Sequence[Sequence[AxisFindings]], names: Sequence[str], tip: AxisSurroundings) -> UnseenShrinkage:
     """On whole runs that took no part in choosing and fitting, one per fit."""
     effects = list(dict.fromkeys((c.effect, c.target) for found in judged for a in found for c in a.causes))
     runs = []
@@ -144,7 +145,7 @@ def shrinkage(judged: Sequence[Sequence[AxisFindings]], names: Sequence[str], ti
     return unseen_shrinkage(runs, effects, holdout=tuple(names), actuators=_actuators_unseen(judged))
 
 
-def _unseen(found: Sequence[AxisFindings], tip: TipMotion, *, explained: bool) -> Floats:
+def _unseen(found: Sequence[AxisFindings], tip: AxisSurroundings, *, explained: bool) -> Floats:
     """Squares (n,) of the distance of the tip, mm2, on withheld runs; of drive forces, N2, where the logs lack set-points."""
     errors = held_errors(found, explained=explained)
     if errors:

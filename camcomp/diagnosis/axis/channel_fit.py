@@ -163,37 +163,59 @@ def _shaped(
     data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats], sd: float
 ) -> tuple[list[AxisCause], list[Floats]]:
     """Terms and amplitudes with the shapes of the causes that act by one Gauss-Newton step; as they are where it does not help."""
-    names = [(i, name) for i in members for name in terms[i].scanned if terms[i].shape[name] > 0.0]
-    terms, at = [*terms], [*at]
+    terms, at, names = [*terms], [*at], _scanned(terms, members)
     if not names:
         return terms, at
     base = _misfit(data, terms, members, at, sd)
-    acting = [i for i in members]
-    slopes, values = {}, {}
-    for k in data.train:
-        here = data.response(k, [(terms[i], at[i]) for i in acting])
-        own = [data.healthy_columns(k)]
-        for i in acting:
-            for d in np.diag(STEP * np.maximum(np.abs(at[i]), 1.0)):
-                more = data.response(k, [(terms[j], at[j] + d if j == i else at[j]) for j in acting])
-                own.append((more - here)[:, None] / d.sum())
-        for i, name in names:
-            longer = replace(terms[i], shape={**terms[i].shape, name: terms[i].shape[name] * (1.0 + STEP)})
-            more = data.response(k, [(longer if j == i else terms[j], at[j]) for j in acting])
-            own.append((more - here)[:, None] / STEP)
-        slopes[k], values[k] = np.concatenate(own, axis=1), data.values[k] - here
-    prior = np.concatenate([*data.scales.values()])
-    c = _shrunk(data.in_floors(slopes), data.in_floors(values), prior, sd)[len(prior) :]
+    change, _ = _jointly(data, terms, members, at, sd)
     for share in (1.0, 0.3, 0.1):
         moved, by, place = [*at], [*terms], 0
-        for i in acting:
-            moved[i] = at[i] + share * c[place : (place := place + len(at[i]))]
-        for (i, name), change in zip(names, c[place:], strict=True):
-            factor = float(np.exp(np.clip(share * change, -MOST_CHANGE, MOST_CHANGE)))
+        for i in members:
+            moved[i] = at[i] + share * change[place : (place := place + len(at[i]))]
+        for (i, name), own in zip(names, change[place:], strict=True):
+            factor = float(np.exp(np.clip(share * own, -MOST_CHANGE, MOST_CHANGE)))
             by[i] = replace(by[i], shape={**by[i].shape, name: terms[i].bounded(name, by[i].shape[name] * factor)})
         if _misfit(data, by, members, moved, sd) < base:
             return by, moved
     return terms, at
+
+
+def _scanned(terms: Sequence[AxisCause], members: Sequence[int]) -> list[tuple[int, str]]:
+    """Shapes of members that may have any value."""
+    return [(i, name) for i in members for name in terms[i].scanned if terms[i].shape[name] > 0.0]
+
+
+def _jointly(
+    data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats], sd: float,
+    *, settings: bool = False,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Changes (d,) and standard deviations (d,) of amplitudes of members and of logarithms of their shapes.
+
+    They are fitted jointly with healthy sizes under their priors. settings: jointly with other settings of switches, too,
+    which come last.
+    """
+    names = _scanned(terms, members)
+    others = [(i, each) for i in members for each in terms[i].other_settings] if settings else []
+    rows, values = {}, {}
+    for k in data.train:
+
+        def response(i: int, term: AxisCause, amount: Floats, k: int = k) -> Floats:
+            return data.response(k, [(term, amount) if j == i else (terms[j], at[j]) for j in members])
+
+        here = data.response(k, [(terms[j], at[j]) for j in members])
+        own = [data.healthy_columns(k)]
+        for i in members:
+            for d in np.diag(STEP * np.maximum(np.abs(at[i]), 1.0)):
+                own.append((response(i, terms[i], at[i] + d) - here)[:, None] / d.sum())
+        for i, name in names:
+            longer = replace(terms[i], shape={**terms[i].shape, name: terms[i].shape[name] * (1.0 + STEP)})
+            own.append((response(i, longer, at[i]) - here)[:, None] / STEP)
+        own += [(response(i, each, at[i]) - here)[:, None] for i, each in others]
+        rows[k], values[k] = np.concatenate(own, axis=1), data.values[k] - here
+    healthy, amplitudes = np.concatenate([*data.scales.values()]), sum(len(at[i]) for i in members)
+    prior = np.concatenate([healthy, np.full(amplitudes, np.inf), np.full(len(names), SHAPE_SD), np.ones(len(others))])
+    mean, spread = _shrunk(data.in_floors(rows), data.in_floors(values), prior, sd)
+    return mean[len(healthy) :], spread[len(healthy) :]
 
 
 def _misfit(
@@ -204,17 +226,18 @@ def _misfit(
     A = data.in_floors({k: data.healthy_columns(k) for k in data.train})
     y = data.in_floors({k: data.values[k] - data.response(k, acting) for k in data.train})
     prior = np.concatenate([*data.scales.values()])
-    c = _shrunk(A, y, prior, sd)
-    return float(np.sum((y - A @ c) ** 2) + sd**2 * np.sum((c / np.maximum(prior, 1e-300)) ** 2))
+    c, _ = _shrunk(A, y, prior, sd)
+    return float(np.sum((y - A @ c) ** 2) + sd**2 * np.sum((c / np.maximum(prior, 1e-30)) ** 2))
 
 
-def _shrunk(A: Floats, y: Floats, prior: Floats, sd: float) -> Floats:
-    """Amplitudes (k,) of columns (n, k) by least squares, the first of them under a prior of standard deviations (q,)."""
-    size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
-    shrinks = np.zeros(A.shape[1])
-    shrinks[: len(prior)] = sd / np.maximum(prior, 1e-300)
-    rows = np.concatenate([A / size, np.diag(shrinks / size)])
-    return np.asarray(np.linalg.lstsq(rows, np.concatenate([y, np.zeros(A.shape[1])]), rcond=1e-9)[0] / size)
+def _shrunk(A: Floats, y: Floats, prior: Floats, sd: float) -> tuple[Floats, Floats]:
+    """Amplitudes (k,) of columns (n, k) under a prior of standard deviations (k,), and their own standard deviations (k,)."""
+    weight = 1.0 / np.maximum(prior, 1e-30)
+    unit = 1.0 / np.sqrt(np.sum((A / sd) ** 2, axis=0) + weight**2 + 1e-60)
+    rows = np.concatenate([A / sd * unit, np.diag(weight * unit)])
+    mean = np.linalg.lstsq(rows, np.concatenate([y / sd, np.zeros(len(unit))]), rcond=1e-9)[0] * unit
+    spread = unit * np.sqrt(np.maximum(np.diag(np.linalg.pinv(rows.T @ rows, rcond=1e-12, hermitian=True)), 0.0))
+    return np.asarray(mean, float), np.asarray(spread, float)
 
 
 def _noise(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> float:
@@ -315,7 +338,7 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     every, units = np.concatenate([*slots.values()]), np.concatenate([*linear.unit.values()])
     among = at.covariance(every.tolist()) * np.outer(units, units)
     left, amount, sizes = _left(data, terms, linear)
-    spreads = _spreads_of_shapes(data, terms, linear, amount)
+    spreads = _spreads_of_shapes(data, terms, linear, amount, sd)
     scale = calibration_of("axes")
     causes, acting, effects = [], [], dict[int, Floats]()
     whole = sum(float(np.sum((data.values[k] - data.level) ** 2)) for k in data.train)
@@ -435,48 +458,22 @@ def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[
         if name in term.known:
             low, high = value - term.known[name], value + term.known[name]
         else:
-            factor = float(np.exp(1.96 * float(np.hypot(spreads[name], KNOWN))))
+            factor = float(np.exp(1.96 * float(np.hypot(spreads.get(name, 0.0), KNOWN))))
             low, high = value / factor, value * factor
         out[name] = Estimate.stated(value, low, high)
     return out
 
 
 def _spreads_of_shapes(
-    data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, amount: Sequence[Floats]
+    data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, amount: Sequence[Floats], sd: float
 ) -> dict[int, dict[str, float]]:
-    """Standard deviations of logarithms of shapes by term, jointly with amplitudes and healthy sizes under their priors."""
-    members, model = linear.found.members, linear.model
-    names = [(i, name) for i in members for name in terms[i].scanned]
-    if not names:
-        return {}
-    acting = {i: (terms[i], amount[i]) for i in members}
-    settings = [(i, each) for i in members for each in terms[i].other_settings]
-    slopes = []
-    for k in data.train:
-        own = []
-        for i, name in names:
-            both = [
-                replace(terms[i], shape={**terms[i].shape, name: terms[i].shape[name] * (1.0 + e * STEP)})
-                for e in (1, -1)
-            ]
-            ends = [data.response(k, [*{**acting, i: (each, amount[i])}.values()]) for each in both]
-            own.append((ends[0] - ends[1]) / (2.0 * STEP))
-        for i, each in settings:
-            ends = [data.response(k, [*{**acting, i: (term, amount[i])}.values()]) for term in (each, terms[i])]
-            own.append(ends[0] - ends[1])
-        slopes.append(np.stack(own, axis=1))
-    columns = [j for i in members for j in model.candidates[i].columns]
-    healthy = [j for kind in linear.unit for j in range(*model.layout.covariates[kind].indices(model.layout.size))]
-    designs = [model.layout.design(g)[:, 0, [*columns, *healthy]] for g in model.groups]
-    rows = zip(slopes, designs, model.groups, strict=True)
-    J = np.concatenate([np.hstack((own, design)) / g.sd for own, design, g in rows])
-    prior = np.zeros(J.shape[1])
-    prior[: len(names)] = SHAPE_SD**-2
-    prior[len(names) : len(names) + len(settings)] = 1.0  # springs are known to a factor of two
-    prior[-len(healthy) :] = 1.0
-    size = np.sqrt(np.sum(J**2, axis=0) + prior) + 1e-300
-    inverse = np.linalg.pinv((J / size).T @ (J / size) + np.diag(prior / size**2), rcond=1e-9)
+    """Standard deviations of logarithms of shapes by term."""
+    members = linear.found.members
+    names = _scanned(terms, members)
     out: dict[int, dict[str, float]] = {}
-    for place, (i, name) in enumerate(names):
-        out.setdefault(i, {})[name] = float(np.sqrt(max(inverse[place, place], 0.0)) / size[place])
+    if names:
+        _, spread = _jointly(data, terms, members, amount, sd, settings=True)
+        first = sum(len(amount[i]) for i in members)
+        for (i, name), own in zip(names, spread[first:].tolist(), strict=False):
+            out.setdefault(i, {})[name] = own
     return out

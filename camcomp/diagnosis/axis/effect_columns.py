@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from camcomp.diagnosis.axis.findings import AxisRun
-from camcomp.diagnosis.axis.predicted import depends_on_start
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model import signal_path
@@ -104,7 +104,7 @@ class DrivenAxis:
     """One run of one axis as the signal path sees it: mm or rad; lever: the study's mm per unit of the axis.
 
     weight, inertia (n,): load of the stated masses on the drive, N or N mm; 0 where none are stated. way (n,): of the axis,
-    where it is known better than by its encoder, in the study's mm.
+    where it is known better than by its encoder, in the study's mm. temperature (n,): C, None where none is logged.
     """
 
     run: AxisRun
@@ -113,6 +113,7 @@ class DrivenAxis:
     weight: Floats
     inertia: Floats
     way: Floats | None = None
+    temperature: Floats | None = None
 
     @cached_property
     def asked(self) -> Motion:
@@ -169,12 +170,42 @@ class DrivenAxis:
         first = (position[1:2] - position[:1]) / (time[1] - time[0])
         loads = MassLoads(self.inertia[:, None], np.zeros((len(time), 6)))
         plain = Motion(
-            time=time, common=self.run.started + time, cut_min=np.zeros(len(time)), temperature=None, encoder=position,
+            time=time, common=self.run.started + time, cut_min=np.zeros(len(time)), encoder=position,
+            temperature=None if self.temperature is None else np.interp(time, self.run.time, self.temperature),
             speed=speed, direction=direction(position), home=np.array([self.actuator.home]),
             stiffness=np.array([np.inf if self.actuator.stiffness is None else self.actuator.stiffness]),
             names=(self.actuator.name,), masses=lambda: loads,
         )  # fmt: skip
         return replace(plain, seams=Seams(np.zeros(1, int), np.full(1, np.inf), first))
+
+
+def depends_on_start(servo: Sequence[Cause], motion: Motion, start: Floats, levers: Floats) -> Bools:
+    """Rows (n, m) whose predicted encoders depend on how the axes moved before the log began.
+
+    start (1, m): first encoders; levers (m,): way in mm per unit of a coordinate.
+    """
+    late = signal_path.controlled(servo, motion.names, motion)
+    others = [signal_path.controlled(servo, motion.names, replace(motion, seams=None)) - late]
+    loops = [cause for cause in servo if "law" not in cause.values]
+    if loops and len(motion.time) > 1:
+        settled = signal_path.controlled(loops, motion.names, motion)
+        others.append(signal_path.controlled(loops, motion.names, _begun(motion, start))[1:] - settled)
+    return np.asarray(np.any([np.abs(each) > REPEATABILITY_MM / levers for each in others], axis=0))
+
+
+def _begun(motion: Motion, start: Floats) -> Motion:
+    """The motion with a row before it, at which the axes stand at positions (1, m)."""
+
+    def held(values: Floats) -> Floats:
+        return np.concatenate([values[:1], values])
+
+    step = motion.time[1] - motion.time[0]
+    time, common = (np.concatenate([each[:1] - step, each]) for each in (motion.time, motion.common))
+    return replace(
+        motion, time=time, common=common, cut_min=held(motion.cut_min), encoder=np.concatenate([start, motion.encoder]),
+        speed=held(motion.speed), direction=held(motion.direction), seams=None,
+        temperature=None if motion.temperature is None else held(motion.temperature),
+    )  # fmt: skip
 
 
 def candidates(

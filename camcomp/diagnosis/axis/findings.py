@@ -55,6 +55,11 @@ class AxisRun:
         return self.setpoint - self.encoder + (0.0 if self.expected is None else self.expected)
 
     @property
+    def numbers(self) -> np.ndarray:
+        """Number (n,) of every row in its log, from 1."""
+        return np.arange(1, len(self.time) + 1) if self.row is None else self.row
+
+    @property
     def clear(self) -> Bools:
         """Rows (n,) of which somebody saw how fast the axis was."""
         return np.ones(len(self.time), bool) if self.seen is None else self.seen
@@ -66,7 +71,7 @@ class AxisRun:
 
     def without_spikes(self) -> tuple[AxisRun, np.ndarray]:
         """The run with neighbours in the place of rows that are no measurement, and these rows' numbers."""
-        row = np.arange(1, len(self.time) + 1) if self.row is None else self.row
+        row = self.numbers
         off = np.zeros(len(self.time), bool)
         kept: dict[str, Floats] = {}
         if len(row) < 2:
@@ -131,11 +136,10 @@ class AxisRun:
 
     def of(self, rows: Bools) -> AxisRun:
         """Some of the rows (n,)."""
-        row = np.arange(1, len(rows) + 1) if self.row is None else self.row
         time, setpoint, encoder, force = (x[rows] for x in (self.time, self.setpoint, self.encoder, self.force))
         seen = self.clear[rows]
         return replace(
-            self, time=time, setpoint=setpoint, encoder=encoder, force=force, row=row[rows], seen=seen,
+            self, time=time, setpoint=setpoint, encoder=encoder, force=force, row=self.numbers[rows], seen=seen,
             course=self.asked, expected=None if self.expected is None else self.expected[rows],
             load=None if self.load is None else self.load[rows],
         )  # fmt: skip
@@ -248,8 +252,7 @@ class AxisFindings:
     def copied(self) -> AxisFindings:
         """The findings with lists of their own."""
         return replace(
-            self, causes=[*self.causes], unknown_in=[*self.unknown_in], details={**self.details},
-            imitated={**self.imitated},
+            self, causes=[*self.causes], unknown_in=[*self.unknown_in], imitated={**self.imitated}, details={**self.details},
         )  # fmt: skip
 
     @property

@@ -19,107 +19,23 @@ import numpy as np
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.channel_data import TURNING, ChannelData, Response, healthy_sizes
 from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel
-from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising, seen_elsewhere, sharp
+from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
-from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisFindings, AxisRun, ChannelRun
+from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun, ChannelRun
 from camcomp.diagnosis.axis.gate import WITHIN, judge, not_known
 from camcomp.diagnosis.axis.row_noise import log_gain
-from camcomp.diagnosis.axis.terms import AxisTravel, ripple, travel
+from camcomp.diagnosis.axis.surroundings import AxisSurroundings
+from camcomp.diagnosis.axis.terms import AxisTravel, ripple
 from camcomp.diagnosis.law.words import law_sum
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.result.types import LawPart
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.hysteresis import PRESLIDING_MM
-from camcomp.model.statics.arm import arm_of
-from camcomp.model.statics.description import Actuator, Robot, Transform
-from camcomp.model.statics.hanging import hang
-from camcomp.model.statics.masses import has_moved_mass, mass_loads
-from camcomp.model.statics.rotation import rotations_of
 
 TURNS_MM = (1e-4, 0.003, 0.02, 0.1)  # ways over which the friction of a slide turns round in its following error
 TURNS_MM_PER_S = (0.3, 1.5, 5.0)  # speeds with which it may turn round instead
 CREEP = 0.02  # of the fastest row: speed at which Coulomb friction has turned round
-LEAST_ARM = 1e-3  # of a direction, or of an arm of 1 m: by which a weight has to change with the pose
-
-
-@dataclass(frozen=True, eq=False)
-class AxisSurroundings:
-    """Surroundings of an axis for its model: the machine, and how all axes moved.
-
-    axes: runs by axis name, in the study's mm per lever.
-    """
-
-    robot: Robot | None
-    axes: Mapping[str, Sequence[AxisRun]]
-
-    def driven(self, name: str, run: AxisRun) -> DrivenAxis:
-        """One run of an axis with the loads of the stated masses on its drive."""
-        none = np.zeros(len(run.time))
-        free = Actuator(name=name, revolute=run.revolute, axis=np.array([0.0, 0.0, 1.0]), stiffness=None)
-        actuator = next((a for a in self.robot.actuators if a.name == name), None) if self.robot is not None else None
-        bare = DrivenAxis(run=run, actuator=actuator or free, lever=lever_mm(run.revolute), weight=none, inertia=none)
-        if self.robot is None or actuator is None:
-            return bare
-        if arm_of(self.robot) is None or not has_moved_mass(self.robot, name):
-            return bare
-        j, q = self._index(name), self.positions(run)
-        inertia = mass_loads(self.robot, q, run.time).drive[:, j]
-        return replace(bare, weight=hang(self.robot, q).drive[:, j], inertia=inertia)
-
-    def positions(self, run: AxisRun) -> Floats:
-        """Coordinates (n, m) of all actuators at the rows of a run, mm or rad; an axis that is not logged stands at its start."""
-        assert self.robot is not None
-        out = []
-        for a in self.robot.actuators:
-            own = next((r for r in self.axes.get(a.name, ()) if r.name == run.name), None)
-            known = np.isfinite(own.encoder) if own is not None else np.zeros(0, bool)
-            if own is None or not known.any():
-                out.append(np.full(len(run.time), a.home if a.start is None else a.start))
-            else:
-                out.append(np.interp(run.time, own.time[known], own.encoder[known]) / lever_mm(own.revolute))
-        return np.stack(out, axis=1)
-
-    def weights(self, name: str, run: AxisRun) -> Floats:
-        """Columns (n, w): torque of the first moments of a joint's link, and of a weight at the end of the arm, per N mm and N."""
-        arm = None if self.robot is None else arm_of(self.robot)
-        if arm is None or self.robot is None:
-            angle = run.encoder / lever_mm(True)
-            return np.stack([np.sin(angle), np.cos(angle)], axis=1)
-        q, start = self.positions(run), self._index(name)
-        rotation, point, j = np.broadcast_to(arm.chain.frame, (len(q), 3, 3)), np.zeros((len(q), 3)), 0
-        axis, about, link = np.zeros((len(q), 3)), point, rotation
-        for e in arm.chain.elements:
-            if isinstance(e, Transform):
-                point, rotation = point + rotation @ e.translation, rotation @ e.rotation
-            elif isinstance(e, Actuator):
-                along = rotation @ e.axis
-                if e.revolute:
-                    rotation = rotation @ rotations_of(q[:, j, None] * e.axis)
-                else:
-                    point = point + q[:, j, None] * along
-                if j == start:
-                    axis, about, link = along, point, rotation
-                j += 1
-        arms = [*(link[:, :, i] for i in range(3)), (point - about) / lever_mm(True)]
-        columns = [np.einsum("ni,ni->n", axis, np.cross(each, (0.0, 0.0, -1.0))) for each in arms]
-        moving = [each for each in columns if np.ptp(each) > LEAST_ARM]
-        return np.stack(moving, axis=1) if moving else np.zeros((len(q), 0))
-
-    def others(self, name: str, run: AxisRun, wide: int) -> dict[str, AxisTravel]:
-        """How the other axes moved in the same run."""
-        out = {}
-        for other, runs in self.axes.items():
-            own = next((r for r in runs if r.name == run.name), None)
-            if other == name or own is None or len(own.time) < ROWS:
-                continue
-            if np.isfinite(own.encoder).all() and np.ptp(own.encoder) > 0.0:
-                out[other] = travel(own.time, own.encoder, wide)
-        return out
-
-    def _index(self, name: str) -> int:
-        assert self.robot is not None
-        return [a.name for a in self.robot.actuators].index(name)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -343,11 +259,8 @@ def _with_pushes(
     for _ in range(CAUSES):
         beside = {k: data.healthy_columns(k) for k in data.train}
         left = {k: done.left[k] for k in data.train}
-        found = find_window(left, beside, {k: rows.moves[k].time for k in left}, data.floor)
-        if found is None:
-            break
-        window, rest = found
-        if not (sharp(window, rest, rows.moves[window.run].time) or seen_elsewhere(window, rows.moves)):
+        window = find_window(left, beside, {k: rows.moves[k].time for k in left})
+        if window is None:
             break
         more = [*pushes, _push(name, window, rows)]
         again = fit_channel(data, [*terms, *more])

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
 from camcomp.diagnosis.axis.findings import ROWS, AxisRun
 from camcomp.diagnosis.axis.noise_floor import rows_floor
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, solve, travel
+from camcomp.diagnosis.model.readings import Reading, refuse_as_read
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
 HEAVIEST_KG = 2e4  # of what one drive moves
 SLOWEST_S = 0.5  # of a loop that still follows its set-points
-LARGE, BETTER = (
-    0.5,
-    0.2,
-)  # of the travel: a gap that is no lag; of the gap: what another encoder leaves that is the right one
+LARGE = 0.5  # of the travel: a gap that is no lag
 MIDDLE = (0.02, 0.98)  # quantiles between which values are looked at
 TRAVELS = 100.0  # deviations of a row that an axis which moves goes at least
-NEAR = 0.1  # of a factor between set-points and encoder
-_FACTORS = {1e3: "m", 1e-3: "um", 25.4: "inches", 180.0 / np.pi: "degrees where radians are due"}
+_FACTORS = {1e3: "m", 25.4: "inches", 180.0 / np.pi: "degrees where radians are due"}
 
 
 def check_axes(log: str, runs: Mapping[str, AxisRun], cutting: bool = False) -> None:
@@ -33,8 +30,9 @@ def check_axes(log: str, runs: Mapping[str, AxisRun], cutting: bool = False) -> 
         both = np.isfinite(run.setpoint) & np.isfinite(run.encoder)
         if both.sum() < ROWS or not _moves(run.setpoint[both], run.encoder[both]):
             continue
-        _check_factor(log, name, run.setpoint[both], run.encoder[both])
-        _check_order(log, name, runs)
+        off = _spread(run.setpoint[both] - run.encoder[both])
+        if off > LARGE * _spread(run.setpoint[both]):
+            refuse_as_read(log, off, _readings(name, runs))
         _check_size(log, name, run, cutting)
 
 
@@ -54,34 +52,28 @@ def _refused(rule: str, log: str, text: str) -> ConfigError:
     return ConfigError(rule, text, at=Location(log, 1, 1))
 
 
-def _check_factor(log: str, name: str, setpoint: Floats, encoder: Floats) -> None:
-    slope = float(np.cov(setpoint, encoder)[0, 1] / np.var(encoder, ddof=1))
-    if abs(slope + 1.0) < NEAR:
-        raise _refused(
-            "CC408", log, f"set-points and encoder of {name} run in opposite directions: one of them is reversed"
-        )
-    for factor, unit in _FACTORS.items():
-        for ratio, what in ((factor, "encoder"), (1.0 / factor, "set-points")):
-            if abs(slope / ratio - 1.0) < NEAR:
-                verb = "looks" if what == "encoder" else "look"
-                raise _refused("CC407", log, f"the {what} of {name} {verb} as if logged in {unit}")
-
-
-def _check_order(log: str, name: str, runs: Mapping[str, AxisRun]) -> None:
+def _readings(name: str, runs: Mapping[str, AxisRun]) -> Iterator[Reading]:
+    """Other ways to read set-points and encoder of an axis, with what they leave of the gap."""
     run = runs[name]
     known = np.isfinite(run.setpoint)
+    setpoint, time = run.setpoint[known], run.time[known]
 
-    def off(other: AxisRun) -> float:
+    def gap(other: AxisRun, encoder: float = 1.0, asked: float = 1.0) -> Callable[[], float]:
         there = np.isfinite(other.encoder)  # rows that one axis has lost another one has
-        gap = run.setpoint[known] - np.interp(run.time[known], other.time[there], other.encoder[there])
-        return _spread(gap)
+        moved = np.interp(time, other.time[there], other.encoder[there])
+        return lambda: _spread(asked * setpoint - encoder * moved)
 
-    own = off(run)
-    if own <= LARGE * _spread(run.setpoint[known]):
-        return
+    yield (
+        "CC408",
+        f"set-points and encoder of {name} run in opposite directions: one of them is reversed",
+        gap(run, -1.0),
+    )
+    for factor, unit in _FACTORS.items():
+        yield "CC407", f"the encoder of {name} looks as if logged in {unit}", gap(run, factor)
+        yield "CC407", f"the set-points of {name} look as if logged in {unit}", gap(run, 1.0, factor)
     for other, each in runs.items():
-        if other != name and np.isfinite(each.encoder).sum() >= ROWS and off(each) < BETTER * own:
-            raise _refused("CC408", log, f"the set-points of {name} fit the encoder of {other}: columns are exchanged")
+        if other != name and np.isfinite(each.encoder).sum() >= ROWS:
+            yield "CC408", f"the set-points of {name} fit the encoder of {other}: columns are exchanged", gap(each)
 
 
 def _check_size(log: str, name: str, run: AxisRun, cutting: bool) -> None:

@@ -16,18 +16,19 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.axis import answer
-from camcomp.diagnosis.axis.at_tip import TipMotion
-from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisDeviation, AxisFindings, AxisRun
+from camcomp.diagnosis.axis.findings import ROWS, AxisDeviation, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import AxisGate
-from camcomp.diagnosis.axis.joint import AxisSurroundings, JointRows, study_channel
+from camcomp.diagnosis.axis.joint import JointRows, study_channel
 from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
 from camcomp.diagnosis.axis.next_moves import next_moves
 from camcomp.diagnosis.axis.noise_floor import following_floor, rows_floor
-from camcomp.diagnosis.axis.terms import AxisTravel, solve, travel
+from camcomp.diagnosis.axis.surroundings import AxisSurroundings
+from camcomp.diagnosis.axis.terms import AxisTravel, travel
 from camcomp.diagnosis.law.folds import PARTS
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM
+from camcomp.diagnosis.model.verdict import VerdictInputs, Word, decide
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.standards import StandardValues
 from camcomp.diagnosis.result.types import (
@@ -64,9 +65,8 @@ def studied(
     clean = {name: [r.without_spikes() for r in runs] for name, runs in axes.items()}
     outliers = {(r.name, int(row)) for runs in clean.values() for r, rows in runs for row in rows}
     cleaned = {name: [r.on_ticks().away_from_gaps() for r, _ in runs] for name, runs in clean.items()}
-    ask = partial(
-        _every_axis, around=AxisSurroundings(robot, cleaned), without=set(without), stated=stated or AxisDeviation()
-    )
+    around = AxisSurroundings(robot, cleaned)
+    ask = partial(_every_axis, around=around, without=set(without), stated=stated or AxisDeviation())
     found = [a for a in ask(set(holdout), parts=1 + again) if a.channels]
     if not found:
         raise ValueError(
@@ -75,14 +75,14 @@ def studied(
     answer.share_lag(found)
     with progress.part(1.0 / (1 + again), 1.0):
         judged = [ask({one}) for one in progress.steps(held, len(held))] if again else [found] if held else []
-    return _result(found, judged, held, TipMotion(robot, cleaned), outliers), found
+    return _result(found, judged, held, around, outliers), found
 
 
 def _result(
     found: list[AxisFindings],
     judged: Sequence[Sequence[AxisFindings]],
     held: Sequence[str],
-    tip: TipMotion,
+    tip: AxisSurroundings,
     outliers: set[tuple[str, int]],
 ) -> DiagnosisResult:
     """The result of findings of all axes. judged: findings without each of the runs `held`. outliers: runs and rows."""
@@ -142,13 +142,15 @@ def _nothing_below_the_floor(axis: AxisFindings) -> None:
         axis.unknown_in, axis.law = [], None
 
 
-def _verdict(found: Sequence[AxisFindings]) -> Any:
-    """The verdict; `ambiguous` where too few rows show the residual to be at the floor."""
-    if any(a.strange for a in found):
-        return "unknown"
-    if any(c.gate is None or c.gate.word != "at" for a in found for c in a.channels):
-        return "ambiguous"
-    return "identified" if any(a.causes for a in found) else "none"
+def _verdict(found: Sequence[AxisFindings]) -> Word:
+    """The verdict; gates that are open leave residuals unconfirmed."""
+    causes = [c for a in found for c in a.causes]
+    inputs = VerdictInputs(
+        unknown=float(any(a.strange for a in found)), best=min((c.probability for c in causes), default=1.0),
+        alternatives=0, causes=len(causes), known_noise=True,
+        confirmed=all(c.gate is not None and c.gate.word == "at" for a in found for c in a.channels),
+    )  # fmt: skip
+    return decide(inputs)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -276,32 +278,12 @@ def _second_encoder(found: AxisFindings, task: AxisTask) -> AxisFindings:
 
 
 def _name_rest(found: AxisFindings) -> None:
-    """Time, where residuals above the floor depend on no covariate."""
+    """Time, where residuals above the floor depend on no covariate, or on the position by a ripple alone."""
     if found.unknown_in:
         return
     for channel in found.channels:
         if channel.gate is not None and channel.gate.word == "above":
             stretches = sum(each.share for each in channel.gate.intervals)
-            if found.ripple:  # it may be a small part of what comes and goes
-                if _of_time(channel, found.ripple.period):
-                    found.unknown_in.append((f"time:{found.name}", stretches))
-                continue
-            beyond = max(1.0 - channel.floor**2 / max(channel.squares[1], 1e-300), 0.0)
-            found.unknown_in.append((f"time:{found.name}", stretches or beyond))
-
-
-def _of_time(channel: AxisChannel, period: float) -> bool:
-    """Whether waves of a period mm over the position fail to explain most of the residual inside the gate's
-    intervals.
-    """
-    moves = [r.move for r in channel.fitted]
-    x = np.concatenate([m.position for m in moves])
-    A = np.stack([wave(2.0 * np.pi * x / period) for wave in (np.ones_like, np.sin, np.cos)], axis=1)
-    left = np.concatenate(channel.left)
-    rest = left - A @ solve(A, left)
-    run = np.repeat(np.arange(len(moves)), [len(m.time) for m in moves])
-    time = np.concatenate([m.time for m in moves])
-    on = np.zeros(len(left), bool)
-    for each in channel.gate.intervals if channel.gate is not None else ():
-        on |= (run == each.run) & (time >= each.t0) & (time <= each.t1)
-    return bool(np.sum(rest[on] ** 2) > 0.5 * np.sum(left[on] ** 2)) if on.any() else False
+            beyond = 0.0 if found.ripple else max(1.0 - channel.floor**2 / max(channel.squares[1], 1e-300), 0.0)
+            if stretches or beyond:
+                found.unknown_in.append((f"time:{found.name}", stretches or beyond))

@@ -99,23 +99,14 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
     span = float(np.ptp(x)) if len(x) else 0.0
     if span < 4.0 * shortest:
         return None
-    # rows are spread evenly over the way, so that slow stretches do not count for more
-    bins = np.round(x / (shortest / 12.0)).astype(int)
-    found = []
+    frequency = np.arange(1.0 / min(longest, span / 4.0), 1.0 / shortest, 0.1 / span)
+    lines = []
     for sign in (1.0, -1.0):
         on = v * sign > 0
-        if not on.any():
+        if not way[on].any():
             return None
-        lowest = bins[on].min()
-        weight = np.bincount(bins[on] - lowest, way[on])
-        if not weight.any():
-            return None
-        mean = np.bincount(bins[on] - lowest, way[on] * y[on]) / np.maximum(weight, 1e-300)
-        used = weight > 0
-        place = (np.flatnonzero(used) + lowest) * (shortest / 12.0)
-        found.append((place, mean[used], np.sqrt(weight[used])))
-    frequency = np.arange(1.0 / min(longest, span / 4.0), 1.0 / shortest, 0.1 / span)
-    lines = [_lines(place, value - np.average(value, weights=w**2), w, frequency) for place, value, w in found]
+        middle = np.average(y[on], weights=way[on])
+        lines.append(_lines(x[on], y[on] - middle, way[on] / way[on].sum(), frequency))
     both = np.abs(lines[0]) * np.abs(lines[1])
     best = int(np.argmax(both))
     strength = np.sqrt(both)
@@ -133,11 +124,10 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
 
 
 def _lines(x: Floats, y: Floats, weight: Floats, frequency: Floats) -> np.ndarray:
-    """Weighted Fourier sums (f,) of y (n,) at places x (n,), frequencies evenly apart."""
-    w = weight**2 / (weight**2).sum()
+    """Weighted Fourier sums (f,) of y (n,) at places x (n,), frequencies evenly apart; weight (n,): the way of every row."""
     turn, further = np.exp(-2j * np.pi * frequency[0] * x), np.exp(-2j * np.pi * float(np.ptp(frequency[:2])) * x)
     out = np.empty(len(frequency), complex)
     for k in range(len(frequency)):
-        out[k] = turn @ (w * y)
+        out[k] = turn @ (weight * y)
         turn = turn * further
     return out

@@ -1,0 +1,144 @@
+"""The machine around an axis: loads on its drive, columns of weight, motion of other axes, and dx = J(q) e at the tip."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.diagnosis.axis.at_tip import Errors, lever_mm
+from camcomp.diagnosis.axis.effect_columns import DrivenAxis
+from camcomp.diagnosis.axis.findings import ROWS, AxisRun
+from camcomp.diagnosis.axis.terms import AxisTravel, travel
+from camcomp.ground.datatypes import Floats
+from camcomp.model.statics.arm import Arm, arm_of, end_pose, jacobian
+from camcomp.model.statics.description import Actuator, Robot, Transform
+from camcomp.model.statics.hanging import hang
+from camcomp.model.statics.masses import has_moved_mass, mass_loads
+from camcomp.model.statics.rotation import rotations_of
+
+LEAST_ARM = 1e-3  # of a direction, or of an arm of 1 m: by which a weight has to change with the pose
+POSES = 400  # of a run at which the rates of the machine are worked out; between them they are straight
+
+
+@dataclass(frozen=True, eq=False)
+class AxisSurroundings:
+    """The machine around an axis, and how all axes moved: loads on its drive, and the way of the tip by errors of actuators.
+
+    axes: runs by axis name, in the study's mm per lever.
+    """
+
+    robot: Robot | None
+    axes: Mapping[str, Sequence[AxisRun]]
+
+    def driven(self, name: str, run: AxisRun) -> DrivenAxis:
+        """One run of an axis with the loads of the stated masses on its drive."""
+        none = np.zeros(len(run.time))
+        free = Actuator(name=name, revolute=run.revolute, axis=np.array([0.0, 0.0, 1.0]), stiffness=None)
+        actuator = next((a for a in self.robot.actuators if a.name == name), None) if self.robot is not None else None
+        bare = DrivenAxis(run=run, actuator=actuator or free, lever=lever_mm(run.revolute), weight=none, inertia=none)
+        if self.robot is None or actuator is None:
+            return bare
+        if arm_of(self.robot) is None or not has_moved_mass(self.robot, name):
+            return bare
+        j, q = self.index(name), self.coordinates(run.name, run.time)
+        inertia = mass_loads(self.robot, q, run.time).drive[:, j]
+        return replace(bare, weight=hang(self.robot, q).drive[:, j], inertia=inertia)
+
+    def coordinates(self, run: str, time: Floats) -> Floats:
+        """Coordinates (n, m) of all actuators in a run, mm or rad; an axis that is not logged stands at its start."""
+        assert self.robot is not None
+        out = []
+        for a in self.robot.actuators:
+            own = next((r for r in self.axes.get(a.name, ()) if r.name == run), None)
+            known = np.isfinite(own.encoder) if own is not None else np.zeros(0, bool)
+            if own is None or not known.any():
+                out.append(np.full(len(time), a.home if a.start is None else a.start))
+            else:
+                out.append(np.interp(time, own.time[known], own.encoder[known]) / lever_mm(own.revolute))
+        return np.stack(out, axis=1)
+
+    def weights(self, name: str, run: AxisRun) -> Floats:
+        """Columns (n, w): torque of the first moments of a joint's link, and of a weight at the end of the arm, per N mm and N."""
+        arm = None if self.robot is None else arm_of(self.robot)
+        if arm is None or self.robot is None:
+            angle = run.encoder / lever_mm(True)
+            return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+        q, start = self.coordinates(run.name, run.time), self.index(name)
+        rotation, point, j = np.broadcast_to(arm.chain.frame, (len(q), 3, 3)), np.zeros((len(q), 3)), 0
+        axis, about, link = np.zeros((len(q), 3)), point, rotation
+        for e in arm.chain.elements:
+            if isinstance(e, Transform):
+                point, rotation = point + rotation @ e.translation, rotation @ e.rotation
+            elif isinstance(e, Actuator):
+                along = rotation @ e.axis
+                if e.revolute:
+                    rotation = rotation @ rotations_of(q[:, j, None] * e.axis)
+                else:
+                    point = point + q[:, j, None] * along
+                if j == start:
+                    axis, about, link = along, point, rotation
+                j += 1
+        arms = [*(link[:, :, i] for i in range(3)), (point - about) / lever_mm(True)]
+        columns = [np.einsum("ni,ni->n", axis, np.cross(each, (0.0, 0.0, -1.0))) for each in arms]
+        moving = [each for each in columns if np.ptp(each) > LEAST_ARM]
+        return np.stack(moving, axis=1) if moving else np.zeros((len(q), 0))
+
+    def others(self, name: str, run: AxisRun, wide: int) -> dict[str, AxisTravel]:
+        """How the other axes moved in the same run."""
+        out = {}
+        for other, runs in self.axes.items():
+            own = next((r for r in runs if r.name == run.name), None)
+            if other == name or own is None or len(own.time) < ROWS:
+                continue
+            if np.isfinite(own.encoder).all() and np.ptp(own.encoder) > 0.0:
+                out[other] = travel(own.time, own.encoder, wide)
+        return out
+
+    def index(self, name: str) -> int:
+        """Number of an actuator."""
+        assert self.robot is not None
+        return [a.name for a in self.robot.actuators].index(name)
+
+    def errors(self, run: str, errors: Errors) -> Floats:
+        """Distances (n,) mm of the tip in a run, at the times of the axis with the most rows."""
+        time = max((t for t, _ in errors.values()), key=len)
+        rates = self._rates(run, time)
+        own = np.column_stack([
+            np.interp(time, *errors[name]) / lever_mm(hinge) if name in errors else np.zeros(len(time))
+            for name, hinge in self._actuators
+        ])  # fmt: skip
+        return np.asarray(np.sqrt(np.sum(np.einsum("nij,nj->ni", rates, own) ** 2, axis=1)))
+
+    def floor(self, run: str, time: Floats, floors: Mapping[str, float]) -> Floats:
+        """Standard deviations (n,) mm of the tip, of floors by axis."""
+        each = np.array([floors.get(name, 0.0) / lever_mm(hinge) for name, hinge in self._actuators])
+        return np.asarray(np.sqrt(np.sum((self._rates(run, time) * each) ** 2, axis=(1, 2))))
+
+    @property
+    def _actuators(self) -> list[tuple[str, bool]]:
+        """Names, and whether they turn."""
+        if self.robot is None:
+            return [(name, any(r.revolute for r in runs)) for name, runs in self.axes.items()]
+        return [(a.name, a.revolute) for a in self.robot.actuators]
+
+    def _rates(self, run: str, time: Floats) -> Floats:
+        """Motion (n, i, m) of the tip per unit of every actuator; a slide of a machine that is no arm moves it by its own error."""
+        arm, m = None if self.robot is None else arm_of(self.robot), len(self._actuators)
+        if arm is None:
+            return np.broadcast_to(np.eye(m), (len(time), m, m))
+        at = np.unique(np.linspace(0, len(time) - 1, min(POSES, len(time))).round().astype(int))
+        q = self.coordinates(run, time[at])
+        rates = np.array([self._tip_rates(arm, row) for row in q])
+        out = np.empty((len(time), 3, m))
+        for i in range(3):
+            for j in range(m):
+                out[:, i, j] = np.interp(time, time[at], rates[:, i, j])
+        return out
+
+    def _tip_rates(self, arm: Arm, q: Floats) -> Floats:
+        """Rates (3, m) of the tip at joint coordinates q (m,)."""
+        assert self.robot is not None
+        twist, (rotation, _) = jacobian(arm, q), end_pose(arm, q)
+        return np.asarray(twist[:3] + np.cross(twist[3:].T, rotation @ self.robot.tool).T)
