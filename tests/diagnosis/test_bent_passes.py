@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.experiment.driven_run import _aligned
-from camcomp.diagnosis.experiment.log_checks import ASIDE_MM, FAR_MM
+from camcomp.diagnosis.experiment.log_checks import FAR_MM
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
 from camcomp.model.control import open_program
@@ -29,17 +29,21 @@ def driven(tmp_path):
     return program, np.concatenate(tips), np.repeat(np.arange(3.0, 9.0), len(share))
 
 
+def logged(line):
+    return SimpleNamespace(file="log.csv", run="run", measured=SimpleNamespace(line=line))
+
+
 def test_lines_are_those_of_another_pass_until_it_is_known_how_far_the_tool_bends(driven):
     program, tip, line = driven
-    measured = SimpleNamespace(line=line)
+    log = logged(line)
     bent = tip - [0.0, 0.0, BENT_MM]
-    found = _aligned("log.csv", "run", program, bent, measured, FAR_MM)
+    found = _aligned(log, program, bent, FAR_MM)
     assert np.mean(program.track.path.line[found.motion] == line) < 0.5  # the case is what it is meant to be
-    found = _aligned("log.csv", "run", program, bent + [0.0, 0.0, BENT_MM], measured, ASIDE_MM)
+    found = _aligned(log, program, bent + [0.0, 0.0, BENT_MM])
     np.testing.assert_array_equal(program.track.path.line[found.motion], line)
 
 
 def test_lines_of_another_program_are_refused_then(driven):
     program, tip, line = driven
     with pytest.raises(ConfigError, match="CC406|another program"):
-        _aligned("log.csv", "run", program, tip, SimpleNamespace(line=np.maximum(line - 3.0, 2.0)), ASIDE_MM)
+        _aligned(logged(np.maximum(line - 3.0, 2.0)), program, tip)

@@ -64,6 +64,37 @@ class DrivenRun:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Logged:
+    """The log of a run: file and run for messages; started: s on the common clock; temperature (n,) or None; acceleration: of
+    the controller, mm/s2.
+    """
+
+    file: str
+    run: str
+    measured: Measured
+    twin: Twin
+    started: float
+    temperature: Floats | None
+    acceleration: float
+
+    def refuse(self, rule: str, message: str) -> ConfigError:
+        """The error of this log."""
+        return ConfigError(rule, f"run '{self.run}'{message}", at=Location(self.file, 1, 1))
+
+    def path(self, rho: Floats, tip: Floats, forces: Forces, rotation: Floats | None) -> RunPath:
+        """Run path of actuators (n, m) with their tips (n, 3), program frame, and rotations (n, 3, 3) of the platform."""
+        return driven_path(
+            self.twin, self.run, time=self.measured.time, rho=rho, tip=tip, forces=forces, started=self.started,
+            temperature=self.temperature, rotation=rotation,
+        )  # fmt: skip
+
+    def over_time(self, values: Floats, known: Bools | None = None) -> Floats:
+        """Values (n, c) with empty cells, and rows that are not known (n,), interpolated over time."""
+        seen = values if known is None else np.where(known[:, None], values, np.nan)
+        return np.column_stack([_over_time(self.measured.time, v) for v in seen.T])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Program:
     """A program with its loads and sampled positions: tips (s, 3) mm, program frame, and actuators (s, m).
 
@@ -84,53 +115,34 @@ class _Program:
         return float(np.median(feeds)) if len(feeds) else np.nan
 
 
-def drive(
-    log: str,
-    name: str,
-    *,
-    measured: Measured,
-    text: Program | None,
-    conditions: Conditions,
-    twin: Twin,
-    started: float,
-    temperature: Floats | None,
-    acceleration: float,
-) -> DrivenRun:
-    """The run of a log; text: its program, or None; acceleration: of the controller, mm/s2.
-
-    Raises ConfigError CC402, CC406 to CC408.
-    """
+def drive(log: Logged, text: Program | None, conditions: Conditions) -> DrivenRun:
+    """The run of a log; text: its program, or None. Raises ConfigError CC402, CC406 to CC408."""
+    twin, measured = log.twin, log.measured
     program = None if text is None else _open(text, conditions, twin)
-    by = _channel(log, name, measured, has_program=program is not None)
+    by = _channel(log, has_program=program is not None)
     if by == "tip" and program is not None:
-        return _led_by_tip(
-            log, name, measured=measured, program=program, twin=twin, started=started,
-            temperature=temperature, acceleration=acceleration,
-        )  # fmt: skip
-    rho, guessed = _commanded(log, name, measured, by, twin)
+        return _led_by_tip(log, program)
+    rho, guessed = _commanded(log, by)
     revolute = np.array([a.revolute for a in twin.robot.actuators])
     rotary = bool(revolute.all())
     if program is not None:
-        check_set_points(log, name, what=by, told=rho, program=program.rho, actuators=twin.actuators, rotary=rotary)
-    tip, turned = _forward(
-        twin, rho, *_near(log=log, name=name, measured=measured, rho=rho, program=program, twin=twin)
-    )
-    aligned = None if program is None else _aligned(log, name, program, tip, measured)
+        check_set_points(
+            log.file, log.run, what=by, told=rho, program=program.rho, actuators=twin.actuators, rotary=rotary
+        )
+    tip, turned = _forward(twin, rho, *_near(log, rho, program))
+    aligned = None if program is None else _aligned(log, program, tip)
     check = partial(
-        check_places, log, name, measured=measured, rho=rho, tip=tip, actuators=twin.actuators, rotary=rotary
+        check_places, log.file, log.run, measured=measured, rho=rho, tip=tip, actuators=twin.actuators, rotary=rotary
     )
     cut: Aligned | None = None
     try:
         if program is not None and by == "setpoint":
-            cut = _behind(measured, tip, turned, program, twin)
+            cut = _behind(log, tip, turned, program)
     except PhysicsError:  # also for encoders in another unit
         check(loaded=lambda: tip)
         raise
-    forces, idle = _forces_at_rows(program, aligned, cut, tip, measured=measured, twin=twin)
-    run_path = driven_path(
-        twin, name, time=measured.time, rho=rho, tip=tip, forces=forces, started=started, temperature=temperature,
-        rotation=turned,
-    )  # fmt: skip
+    forces, idle = _forces_at_rows(program, aligned, cut, tip, log)
+    run_path = log.path(rho, tip, forces, turned)
     if program is None:
         run_path = replace(run_path, measured_force=True)
     else:
@@ -141,53 +153,46 @@ def drive(
     loaded = cache(lambda: twin.sense(run_path)[0])
     check(loaded=lambda: loaded().tip)
     check_forces(
-        name=log, run=name, measured=measured, force=run_path.row_force, drives=lambda: loaded().drive, rotary=revolute
-    )
+        name=log.file, run=log.run, measured=measured, force=run_path.row_force, drives=lambda: loaded().drive,
+        rotary=revolute,
+    )  # fmt: skip
     return DrivenRun(
         run_path=run_path, by=by, unsure=np.asarray(guessed.any(axis=1)) | idle, guessed=guessed, turn=None,
         lag=0 if aligned is None else aligned.lag,
     )  # fmt: skip
 
 
-def _channel(log: str, name: str, measured: Measured, *, has_program: bool) -> str:
+def _channel(log: Logged, *, has_program: bool) -> str:
     """Channel of the motion: set-points, else encoders, else the tip along a program. Raises ConfigError CC402."""
-    by = next((each for each in ("setpoint", "encoder", "tip") if measured.has(each)), "")
+    by = next((each for each in ("setpoint", "encoder", "tip") if log.measured.has(each)), "")
     if not by or (by == "tip" and not has_program):
-        message = f"run '{name}' has neither a program nor set-points: the commanded motion is unknown"
-        raise ConfigError("CC402", message, at=Location(log, 1, 1))
+        raise log.refuse("CC402", " has neither a program nor set-points: the commanded motion is unknown")
     return by
 
 
-def _commanded(log: str, name: str, measured: Measured, by: str, twin: Twin) -> tuple[Floats, Bools]:
+def _commanded(log: Logged, by: str) -> tuple[Floats, Bools]:
     """Actuators (n, m) of the channel `by` over time, and a mask (n, m) of those that are unknown. Raises CC404."""
-    logged = getattr(measured, by)
+    logged, time = getattr(log.measured, by), log.measured.time
     if np.isfinite(logged).sum(axis=0).min() < 2:
-        message = f"run '{name}': hardly a row holds the {by} of every actuator"
-        raise ConfigError("CC404", message, at=Location(log, 1, 1))
+        raise log.refuse("CC404", f": hardly a row holds the {by} of every actuator")
     guessed = [
-        _guessed(measured.time, v, GUESSED_RAD if a.revolute else GUESSED_MM)
-        for v, a in zip(logged.T, twin.robot.actuators, strict=True)
+        _guessed(time, v, GUESSED_RAD if a.revolute else GUESSED_MM)
+        for v, a in zip(logged.T, log.twin.robot.actuators, strict=True)
     ]
-    return np.column_stack([_over_time(measured.time, v) for v in logged.T]), np.column_stack(guessed)
+    return log.over_time(logged), np.column_stack(guessed)
 
 
 def _forces_at_rows(
-    program: _Program | None,
-    aligned: Aligned | None,
-    cut: Aligned | None,
-    tip: Floats,
-    *,
-    measured: Measured,
-    twin: Twin,
+    program: _Program | None, aligned: Aligned | None, cut: Aligned | None, tip: Floats, log: Logged
 ) -> tuple[Forces, Bools]:
     """Cutting forces at the rows, and a mask (n,) of rows at standstill that may be idle.
 
     cut: positions of the drives on the program, where they are behind the set-points `aligned`.
     """
     if program is None or aligned is None:
-        return _measured_forces(measured, twin), np.zeros(len(tip), bool)
-    forces = _program_forces(program, cut or aligned, tip, measured)
-    idle = _idle_or_not(forces, aligned, program, tip, measured.time)
+        return _measured_forces(log.measured, log.twin), np.zeros(len(tip), bool)
+    forces = _program_forces(program, cut or aligned, tip, log.measured)
+    idle = _idle_or_not(forces, aligned, program, tip, log.measured.time)
     # at standstill in a cut the drives may carry the cutting force or not
     return replace(forces, doubt=np.where(idle[:, None], 0.5 * np.abs(forces.force), forces.doubt)), idle
 
@@ -245,38 +250,31 @@ def _forward(twin: Twin, rho: Floats, near: Floats, turned: Floats | None) -> tu
     return twin.to_program(tip), turned
 
 
-def _near(
-    log: str, name: str, measured: Measured, rho: Floats, program: _Program | None, twin: Twin
-) -> tuple[Floats, Floats | None]:
+def _near(log: Logged, rho: Floats, program: _Program | None) -> tuple[Floats, Floats | None]:
     """Tips (n, 3), program frame, and rotations (n, 3, 3) of the platform near those of actuators rho (n, m)."""
     if program is not None:
         _, index = KDTree(program.rho).query(rho)
         return program.tips[index], None if program.rotation is None else program.rotation[index]
-    known = np.isfinite(measured.tip).all(axis=1)
+    known = np.asarray(np.isfinite(log.measured.tip).all(axis=1))
     if not known.any():
-        message = f"run '{name}' has neither a program nor measured tips: its place is not known"
-        raise ConfigError("CC402", message, at=Location(log, 1, 1))
-    return np.column_stack([_over_time(measured.time, np.where(known, v, np.nan)) for v in measured.tip.T]), None
+        raise log.refuse("CC402", " has neither a program nor measured tips: its place is not known")
+    return log.over_time(log.measured.tip, known), None
 
 
-def _aligned(
-    log: str, name: str, program: _Program, tip: Floats, measured: Measured, aside_mm: float = ASIDE_MM
-) -> Aligned:
+def _aligned(log: Logged, program: _Program, tip: Floats, aside_mm: float = ASIDE_MM) -> Aligned:
     """Positions of the tip (n, 3) on its program, mostly within aside_mm of the path. Raises ConfigError CC406.
 
     An aside_mm above ASIDE_MM is for machines with large deflections, whose tip may be nearer to another pass.
     """
-    path = program.track.path
-    line = measured.line
+    path, line = program.track.path, log.measured.line
     known = np.isfinite(line) & (line > 0)
     if known.any() and not np.isin(line[known], path.line).any():
         lines = sorted({int(each) for each in line[known]})[:5]
-        message = f"run '{name}': the rows are on lines that the program does not move on, e.g. {lines}"
-        raise ConfigError("CC406", message, at=Location(log, 1, 1))
+        raise log.refuse("CC406", f": the rows are on lines that the program does not move on, e.g. {lines}")
     found = align(path, tip, line, max(aside_mm, LOST_MM))
-    check_followed(log, name, found.distance[places(tip)], _agreement(path, found, tip), aside_mm)
+    check_followed(log.file, log.run, found.distance[places(tip)], _agreement(path, found, tip), aside_mm)
     if aside_mm <= ASIDE_MM:
-        check_lines(log, name, way_from_lines(path, found))
+        check_lines(log.file, log.run, way_from_lines(path, found))
     return found
 
 
@@ -293,16 +291,15 @@ def _cut_ahead(program: _Program, aligned: Aligned | None) -> float:
     return track.minutes_cut(int(aligned.motion[cuts[0]]), float(aligned.share[cuts[0]])) if len(cuts) else 0.0
 
 
-def _behind(measured: Measured, tip: Floats, turned: Floats | None, program: _Program, twin: Twin) -> Aligned | None:
+def _behind(log: Logged, tip: Floats, turned: Floats | None, program: _Program) -> Aligned | None:
     """Positions of the drives on the program, behind set-points of tips (n, 3) mm, for the direction of the force.
 
     None without logged encoders, or if more than a delay separates them from the path.
     """
-    if np.isfinite(measured.encoder).sum(axis=0).min() < 2:
+    if np.isfinite(log.measured.encoder).sum(axis=0).min() < 2:
         return None
-    late = np.column_stack([_over_time(measured.time, v) for v in measured.encoder.T])
-    driven = _forward(twin, late, tip, turned)[0]
-    found = align(program.track.path, driven, measured.line)
+    driven = _forward(log.twin, log.over_time(log.measured.encoder), tip, turned)[0]
+    found = align(program.track.path, driven, log.measured.line)
     return found if float(np.median(found.distance)) < ASIDE_MM else None
 
 
@@ -357,47 +354,30 @@ def _idle_or_not(forces: Forces, aligned: Aligned, program: _Program, tip: Float
     return out
 
 
-def _led_by_tip(
-    log: str,
-    name: str,
-    *,
-    measured: Measured,
-    program: _Program,
-    twin: Twin,
-    started: float,
-    temperature: Floats | None,
-    acceleration: float,
-) -> DrivenRun:
+def _led_by_tip(log: Logged, program: _Program) -> DrivenRun:
     """Run of a measured tip aligned with the program: its timing is free, and only its lateral deviation is evidence."""
-    path = program.track.path
-    known = np.isfinite(measured.tip).all(axis=1)
-    check_on_program(log, name, measured.tip[known], program.tips)
-    whole = np.column_stack([_over_time(measured.time, np.where(known, v, np.nan)) for v in measured.tip.T])
+    path, twin, measured = program.track.path, log.twin, log.measured
+    known = np.asarray(np.isfinite(measured.tip).all(axis=1))
+    check_on_program(log.file, log.run, measured.tip[known], program.tips)
+    whole = log.over_time(measured.tip, known)
     bend, changed = np.zeros_like(whole), np.inf
     # a deflected tip is off its program by an unknown amount at first, and its position on arcs depends on the deflection
     for beside in (np.inf, *[MAX_CUT_DISTANCE_MM] * MOST_PASSES):
-        aligned = _aligned(
-            log=log, name=name, program=program, tip=whole - bend, measured=measured,
-            aside_mm=ASIDE_MM if beside < np.inf else FAR_MM,
-        )  # fmt: skip
+        aligned = _aligned(log, program, whole - bend, ASIDE_MM if beside < np.inf else FAR_MM)
         way, on = _driven(
-            path=path, aligned=aligned, other=program.merged, tip=whole - bend, line=measured.line,
-            known=np.asarray(known),
-        )  # fmt: skip
+            path=path, aligned=aligned, other=program.merged, tip=whole - bend, line=measured.line, known=known
+        )
         tip = path_geometry.points(way, on.motion, on.share)
         forces = _program_forces(program, aligned, tip, measured, beside)
         turned = twin.platform(way, on.motion, on.share)
-        run_path = driven_path(
-            twin, name, time=measured.time, rho=twin.inverse(twin.to_machine(tip), turned), tip=tip, forces=forces,
-            started=started, temperature=temperature, rotation=turned,
-        )  # fmt: skip
+        run_path = log.path(twin.inverse(twin.to_machine(tip), turned), tip, forces, turned)
         loaded = twin.sense(run_path)[0].tip
         last, changed = changed, float(np.sqrt(np.mean(np.sum((loaded - tip - bend) ** 2, axis=1))))
         bend = loaded - tip
         if beside < np.inf and (changed < SETTLED_MM or changed > last):
             break
     unsure = ~known | (aligned.distance > ASIDE_MM) | _idle_or_not(forces, aligned, program, tip, measured.time)
-    unsure |= _from_anywhere(way, on) | _at_corners(way, on, measured.time, acceleration)
+    unsure |= _from_anywhere(way, on) | _at_corners(way, on, measured.time, log.acceleration)
     later = Cause("time_sync", shelf.load("effects", "time_sync"), None, {"offset_s": -SOON_S})
     velocity = (twin.sense(run_path, [later])[0].tip - loaded) / SOON_S
     run_path = replace(run_path, feed_mm_per_min=program.feed, led=True, cut_ahead_min=_cut_ahead(program, aligned))

@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from camcomp.diagnosis.experiment.driven_run import drive
+from camcomp.diagnosis.experiment.driven_run import Logged, drive
 from camcomp.diagnosis.experiment.log_checks import (
     check_channels,
     check_clock,
@@ -75,11 +75,12 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     conditions = cutting.conditions if spec.cutting else replace(job.conditions, model=None)
     if program is not None:
         check_length(log, spec.name, measured, schedule(program.path, job.config.control.acceleration_mm_per_s2).end)
-    run = drive(
-        log, spec.name, measured=measured, text=program, conditions=conditions, twin=twin, started=spec.started_s,
+    logged = Logged(
+        file=log, run=spec.name, measured=measured, twin=twin, started=spec.started_s,
         temperature=steadied(measured.time, measured.temperature),
         acceleration=job.config.control.acceleration_mm_per_s2,
     )  # fmt: skip
+    run = drive(logged, program, conditions)
     if run.lag:
         notes.append(f"{log}: line numbers are {abs(run.lag)} rows {'late' if run.lag > 0 else 'early'}")
     if run.by == "setpoint":  # encoders are evidence only against set-points
