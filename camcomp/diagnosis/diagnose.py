@@ -28,8 +28,7 @@ from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.classes import MOST_SETS
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.next_experiment.designed import explore, propose
-from camcomp.diagnosis.next_experiment.outcomes import ONLY_NOISE, with_outcomes
-from camcomp.diagnosis.next_experiment.proposal import Proposal
+from camcomp.diagnosis.next_experiment.proposal import ONLY_NOISE, Proposal, with_outcomes
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
@@ -146,7 +145,7 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
     if found.unknown_in:
         return explore(problem, found.left[found.unknown_in].labels, job)
     sets = found.sets
-    best = sets.ranking.best
+    best = sets.first
     close = [best, *sets.rivals[:RIVALS]]
     if len(close) == 1:
         likely = (int(j) for j in np.argsort(-sets.probability) if sets.probability[j] > EXCLUDED)
@@ -160,8 +159,7 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
 
 def _set_name(problem: Problem, f: Fitted) -> str:
     """A set of causes in words."""
-    causes = (problem.columns.candidates[i] for i in f.members)
-    return " and ".join(f"{c.name} ({c.target})" if c.target else c.name for c in causes) or ONLY_NOISE
+    return " and ".join(_named(problem, i).label for i in f.members) or ONLY_NOISE
 
 
 # -- causes -----------------------------------------------------------------------------------------------------------
@@ -274,7 +272,7 @@ def _heat_logged(problem: Problem) -> bool:
 
 def _alternatives(problem: Problem, found: CauseSearch) -> tuple[tuple[NamedCause, ...], ...]:
     rivals = found.sets.rivals
-    fits = [found.sets.fits[j] for j in (found.sets.ranking.best, *rivals[: MOST_SETS - 1])]
+    fits = [found.sets.fits[j] for j in (found.sets.first, *rivals[: MOST_SETS - 1])]
     named = tuple(tuple(_named(problem, i) for i in f.members) for f in fits)
     return named if rivals else (*named, (NamedCause(effect=UNKNOWN, target=None),))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
-from camcomp.diagnosis.fit.bench import Bench, CandidateCause
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of
 from camcomp.diagnosis.fit.open_problem import open_problem
 from camcomp.ground import shelf
 from tests.validation.recorded.experiment import Made, Plan, row_times, write
@@ -43,12 +43,15 @@ def problem(tmp_path_factory):
 
 def test_a_small_force_moves_a_soft_drive_as_much_farther_as_it_is_softer(problem):
     f = problem.refit((0,))
-    (friction,) = problem.candidates.columns[2]
-    assert f.pushed == (friction,)
-    nominal = problem.columns.blocks[0].dense()[:, :, friction]
-    assert np.linalg.norm(problem.farther(f)[0][:, 1, 0]) == pytest.approx(
-        np.linalg.norm(nominal[:, 1]) / FACTOR, rel=0.02
-    )
+    (friction,), (soft,), (play,) = (problem.candidates.columns[i] for i in (2, 0, 1))
+    assert f.farther[friction] == pytest.approx(1.0 / FACTOR, rel=0.02)
+    assert f.farther[soft] == f.farther[play] == 1.0
+    push, bench = CandidateCause("friction", "y", problem.columns.candidates[2].effect), problem.bench
+    causes = problem.causes(f.members, f.theta, f.extra)
+    more = cause_of(push, {"force_N": 1.0, "presliding_mm": 0.005})
+    at_soft = bench.change(0, bench.read(0, [*causes, more]), bench.read(0, causes))
+    nominal = bench.change(0, bench.read(0, [more]), bench.nominal[0])
+    assert np.linalg.norm(at_soft[:, 1]) == pytest.approx(f.farther[friction] * np.linalg.norm(nominal[:, 1]), rel=0.02)
 
 
 def test_friction_within_tolerance_on_a_soft_drive_is_no_play(problem):

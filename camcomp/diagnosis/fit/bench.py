@@ -163,9 +163,25 @@ class Bench:
         return self._thin_slopes[k]
 
     @cached_property
-    def transmission(self) -> float:
-        """Largest motion of the tip per motion of the drives."""
-        return float(max(np.linalg.norm(self.row_slopes(k), 2, axis=(1, 2)).max() for k in range(len(self.runs))))
+    def springs(self) -> Floats:
+        """Stiffness (m,) of the drives, N/mm or N mm/rad; infinite where none is stated."""
+        return np.array([np.inf if a.stiffness is None else a.stiffness for a in self.twin.robot.actuators])
+
+    def at_tip(self, k: int) -> Floats:
+        """Motion of the tip (n, 3, c), machine axes, per unit of every channel at the rows of run k.
+
+        An encoder moves it by the kinematics, a drive force by the spring that it loads, a dynamometer by the compliance.
+        """
+        slopes, lever = self.slopes[k].at(self.runs[k].run_path.row_place), self.twin.nominal.tool
+        force = slopes.tip_wrench[:, :, :3] - np.cross(slopes.tip_wrench[:, :, 3:], lever)
+        tip = np.broadcast_to(np.eye(3), force.shape)
+        return np.concatenate([tip, slopes.tip_rho, slopes.tip_rho / self.springs, force], axis=2)
+
+    @cached_property
+    def tip_sizes(self) -> Floats:
+        """Rms (runs, c) of these motions over the rows of every run."""
+        each = [np.mean(np.sum(self.at_tip(k) ** 2, axis=1), axis=0) for k in range(len(self.runs))]
+        return np.sqrt(each)
 
     def channels(self, k: int, reading: Reading) -> Floats:
         """Channels (n, c) of readings of run k; its tip along and across the path where the tip is the motion."""

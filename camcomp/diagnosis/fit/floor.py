@@ -19,6 +19,7 @@ from camcomp.model.seams import missing_rows
 CLIPPED = 6.0  # robust deviations beyond which a difference of rows is no noise
 LEAST_ROWS = 10  # of a run with a program, for an estimate of its noise
 LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
+RIGID_MM_PER_N = 1e-4  # spring of a drive for which none is stated
 STRETCH, LEAST_STRETCHES = 16, 8  # differences of rows that make a stretch, and stretches that tell a quiet one
 LOWER_QUARTILE = 0.82  # of the scatter of such stretches of white noise, in units of the noise (4000 draws: 0.816)
 UNSTEADY = 1.5  # times the quiet stretches: of 4000 draws of 160 rows of white noise none had it
@@ -118,17 +119,7 @@ def least_noise(bench: Bench, floor: NoiseFloor) -> Floats:
 
     The resolution of a channel is noise, and no finding, however sharp.
     """
-    m = len(bench.actuators)
-    way = np.zeros(m)
-    push = 0.0
-    for k, run in enumerate(bench.runs):
-        slopes = bench.slopes[k].at(run.run_path.row_place)
-        way = np.maximum(way, np.sqrt(np.mean(np.sum(slopes.tip_rho**2, axis=1), axis=0)))
-        push = max(push, float(np.sqrt(np.mean(np.sum(slopes.tip_wrench[:, :, :3] ** 2, axis=(1, 2))))))
-    axis = LEAST_SHARE * floor.axis_mm
-    carriage = axis / np.maximum(way, 1e-9)
-    springs = np.array([np.inf if a.stiffness is None else a.stiffness for a in bench.twin.robot.actuators])
-    drive = carriage * np.where(np.isfinite(springs), springs, 1e4)
-    out = np.concatenate([np.full(3, 0.2 * floor.axis_mm), carriage, drive, np.full(3, axis / max(push, 1e-12))])
+    size = bench.tip_sizes.max(axis=0)
+    least = LEAST_SHARE * floor.axis_mm / np.where(size > 0.0, size, RIGID_MM_PER_N)
     steps = np.max([[resolution_of(x) for x in bench.observed(k).T] for k in range(len(bench.runs))], axis=0)
-    return np.asarray(np.hypot(out, [rounding_noise(each) for each in steps]))
+    return np.asarray(np.hypot(least, [rounding_noise(each) for each in steps]))

@@ -93,23 +93,13 @@ def _together(gaps: list[Floats]) -> list[Floats]:
 
 def rest_by_actuator(problem: Problem, f: Fitted, kind: str) -> dict[str, float]:
     """Energy that a set leaves in one kind of channel by actuator, as shares; that of the tip read as motion of the carriages."""
-    names = problem.bench.actuators
-    m = len(names)
-    energy = np.zeros(m)
+    if kind == "dyno":
+        return {}
+    bench, energy = problem.bench, np.zeros(len(problem.bench.actuators))
     causes = problem.causes(f.members, f.theta, f.extra)
-    for k in range(len(problem.bench.runs)):
-        rest = problem.bench.difference(k, problem.bench.read(k, causes))
-        rest = np.where(np.isfinite(rest), rest, 0.0)
+    for k in range(len(bench.runs)):
+        rest = np.nan_to_num(bench.difference(k, bench.read(k, causes))[:, problem.channels_of(kind)])
         if kind == "tip":
-            rest = _of_carriages(problem, k, rest[:, :3])
-        elif kind in ("encoder", "drive"):
-            rest = rest[:, 3:][:, :m] if kind == "encoder" else rest[:, 3 + m :][:, :m]
-        else:
-            return {}
+            rest = np.einsum("nij,nj->ni", np.linalg.pinv(bench.thin_slopes(k)), rest)
         energy += np.sum(rest**2, axis=0)
-    return places.shares(dict(zip(names, energy.tolist(), strict=True)))
-
-
-def _of_carriages(problem: Problem, k: int, tip: Floats) -> Floats:
-    """Motion of the carriages (n, m) that makes one of the tip (n, 3) in run k."""
-    return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(problem.bench.thin_slopes(k)), tip))
+    return places.shares(dict(zip(bench.actuators, energy.tolist(), strict=True)))

@@ -79,13 +79,6 @@ def inflation(bench: Bench) -> list[Floats]:
     return out
 
 
-def less_certain_drives(bench: Bench, noise: Noise) -> list[Floats]:
-    """Per run (n, m) >= 1: encoders of drives with a lag are less certain where the rows lack a change of speed."""
-    m = len(bench.actuators)
-    unseen = [thinned(each, run.thin) for each, run in zip(_unseen_speeds(bench), bench.runs, strict=True)]
-    return [np.sqrt(1.0 + (e / s[3 : 3 + m]) ** 2) for e, s in zip(unseen, noise.sigma, strict=True)]
-
-
 def _unseen_speeds(bench: Bench) -> list[Floats]:
     """Per run (n, m) mm or rad: a late drive stands behind by its speed, which between rows may have been another one."""
     late = _late(bench)

@@ -8,7 +8,6 @@ import numpy as np
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, thinned
 from camcomp.diagnosis.fit.cause_prior import cause_prior
 from camcomp.diagnosis.fit.columns import (
-    Columns,
     build,
     candidate_columns,
     first_guess,
@@ -16,7 +15,7 @@ from camcomp.diagnosis.fit.columns import (
     patterns,
     shape_default,
 )
-from camcomp.diagnosis.fit.floor import NoiseFloor, least_noise, measure_floor
+from camcomp.diagnosis.fit.floor import least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, reduced_residual, settled_interval
 from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
@@ -29,7 +28,7 @@ from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
 from camcomp.diagnosis.statistics.cause_sets import total
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import Noise
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Floats
 
 
 def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: float | None = None) -> Problem:
@@ -49,20 +48,19 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     shapes: dict[int, dict[str, float]] = {
         i: guessed.get(i, shape_default(a)) for i, a in enumerate(candidates) if a.shapes or a.switches
     }
-    words = patterns(bench)
-    rough = _whiten(
-        bench, columns, words=[], floor=floor, noise=noise, inflate=inflate, times=times, residuals=residuals,
-        shapes=shapes, outliers=outliers,
+    problem = _whitened(
+        Problem(
+            bench=bench, columns=columns, dictionaries=[], inflate=inflate, times=times, residuals=residuals,
+            floor=floor, noise=noise, outliers=outliers, white=[], white_patterns=[], white_residual=[],
+            shapes=shapes, candidates=cause_prior(columns),
+        ), []
     )  # fmt: skip
     if len(columns.of_labels):
-        columns = with_scatter(columns, bench, estimate(total(rough.base_grams), rough.prior, ())[0])
-        rough = replace(rough, columns=columns)
-    noise = _with_model_error(rough)
-    del rough  # its white columns are as large as all that follows
-    problem = _whiten(
-        bench, columns, words=words, floor=floor, noise=noise, inflate=inflate, times=times, residuals=residuals,
-        shapes=shapes, outliers=outliers,
-    )  # fmt: skip
+        mean = estimate(total(problem.base_grams), problem.prior, ())[0]
+        problem = replace(problem, columns=with_scatter(columns, bench, mean))
+    noise = _with_model_error(problem)
+    problem = replace(problem, noise=noise, white=[])  # two sets of white columns at once are much memory
+    problem = _whitened(problem, patterns(bench))
     return _scanned(problem) if shapes else problem
 
 
@@ -85,30 +83,17 @@ def _with_model_error(problem: Problem) -> Noise:
     return replace(problem.noise, sigma=sigma)
 
 
-def _whiten(
-    bench: Bench,
-    columns: Columns,
-    *,
-    words: list[Dictionary],
-    floor: NoiseFloor,
-    noise: Noise,
-    inflate: list[Floats],
-    times: list[Floats],
-    residuals: list[Floats],
-    shapes: dict[int, dict[str, float]],
-    outliers: list[Bools],
-) -> Problem:
-    white, white_patterns, white_residual = [], [], []
-    for k in range(len(bench.runs)):
-        white.append(noise.by_channel(k, columns.blocks[k], inflate[k], times[k]))
-        white_patterns.append([noise.by_channel(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
-        white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
-    words = [replace(each, blocks=()) for each in words]  # white they are enough
-    return Problem(
-        bench=bench, columns=columns, dictionaries=words, inflate=inflate, times=times, residuals=residuals,
-        floor=floor, noise=noise, outliers=outliers, white=white, white_patterns=white_patterns,
-        white_residual=white_residual, shapes=shapes, candidates=cause_prior(columns),
-    )  # fmt: skip
+def _whitened(problem: Problem, words: Sequence[Dictionary]) -> Problem:
+    """The problem with its columns, patterns and residuals white under its noise."""
+    every = [(k, own, t) for k, (own, t) in enumerate(zip(problem.inflate, problem.times, strict=True))]
+    noise, residuals = problem.noise, problem.residuals
+    return replace(
+        problem,
+        dictionaries=[replace(each, blocks=()) for each in words],  # white they are enough
+        white=[noise.by_channel(k, problem.columns.blocks[k], own, t) for k, own, t in every],
+        white_patterns=[[noise.by_channel(k, w.blocks[k], own, t, w.first) for w in words] for k, own, t in every],
+        white_residual=[noise.rows(k, residuals[k][:, :, None], own, t)[:, 0] for k, own, t in every],
+    )
 
 
 def _scanned(problem: Problem) -> Problem:

@@ -10,10 +10,9 @@ from camcomp.diagnosis.fit.bench import Bench, cause_of, step_of
 from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
 from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
-from camcomp.diagnosis.fit.noise import less_certain_drives
-from camcomp.diagnosis.fit.patterns import Dictionary
+from camcomp.diagnosis.fit.patterns import KINDS, Dictionary
 from camcomp.diagnosis.fit.ringing import FOLLOWED, loudest
-from camcomp.diagnosis.fit.small_forces import pushed_farther, small_forces
+from camcomp.diagnosis.fit.small_forces import bent_farther
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
@@ -54,7 +53,6 @@ class Problem:
     candidates: CausePrior
     _heard: dict[int, tuple[float, float]] = field(default_factory=dict, init=False, repr=False)
     _last: tuple[tuple[object, ...], list[Reading]] | None = field(default=None, init=False, repr=False)
-    _farther: tuple[Fitted, tuple[Floats, ...]] | None = field(default=None, init=False, repr=False)
 
     @cached_property
     def tip_gram(self) -> Floats:
@@ -81,10 +79,11 @@ class Problem:
         """The members that move the tip by at most MINOR floors."""
         return tuple(i for i in f.members if self.moved_um(f, (i,)) <= MINOR * self.floor.tip_um)
 
-    @cached_property
-    def late_drives(self) -> list[Floats]:
-        """Per run (n, m) >= 1: how much less than its noise says an encoder tells where a late drive changed its speed unseen."""
-        return less_certain_drives(self.bench, self.noise)
+    def channels_of(self, kind: str) -> slice:
+        """The channels of a kind (patterns.KINDS)."""
+        m = len(self.bench.actuators)
+        first = dict(zip(KINDS, (0, 3, 3 + m, 3 + 2 * m, 6 + 2 * m), strict=False))[kind]
+        return slice(first, first + (3 if kind in ("tip", "dyno") else m))
 
     @property
     def prior(self) -> Prior:
@@ -192,19 +191,16 @@ class Problem:
                 far = False
             if step > 0 and size < SETTLED:
                 break
-        causes = self.causes(members, theta, shapes)
-        small = small_forces(self.columns.candidates, members, causes) if bent else ()
-        pushed, pushed_at = tuple(self.member_columns(small)), theta
-        if small:
-            also = [self.whitened(k, each) for k, each in enumerate(self._pushed(small, causes))]
-            both = [np.column_stack(pair) for pair in zip(white, also, strict=True)]
+        farther = bent_farther(self.columns, members, self.causes(members, theta, shapes))
+        if len(pushed := np.flatnonzero(farther > 1.0)):
+            both = [np.column_stack([own, self._pushed(k, farther)]) for k, own in enumerate(white)]
             grams = self._grams_at([*index, *pushed], both, left)
         scale = Scale(total(grams), self.prior, self.candidates)
         mean, full = estimate(total(grams), self.prior, index)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
         return Fitted(
             members=members, theta=theta, covariance=covariance, log_evidence=scale(members), grams=grams,
-            extra=shapes, white=tuple(white), residual=tuple(left), pushed=pushed, pushed_at=pushed_at,
+            extra=shapes, white=tuple(white), residual=tuple(left), farther=farther,
         )  # fmt: skip
 
     def _without_members(self) -> Fitted:
@@ -218,27 +214,22 @@ class Problem:
             extra={},
         )
 
-    def _pushed(self, small: Members, causes: Sequence[Cause]) -> tuple[Floats, ...]:
-        """Per run (n, c, p): effect of small forces on the channels of the machine that the causes make."""
-        forces = [(self.columns.candidates[i], self.shapes.get(i, {})) for i in small]
-        return pushed_farther(self.bench, causes, self._read(causes), forces)
-
-    def farther(self, f: Fitted) -> tuple[Floats, ...]:
-        """The same of a fit's columns `pushed`, of the fit asked for last: those of all fits are as large as all else."""
-        if self._farther is None or self._farther[0] is not f:
-            assert f.pushed_at is not None
-            causes = self.causes(f.members, f.pushed_at, f.extra)
-            small = small_forces(self.columns.candidates, f.members, causes)
-            self._farther = f, self._pushed(small, causes)
-        return self._farther[1]
-
     def white_at(self, f: Fitted) -> list[ByChannel]:
         """White columns (w, k) per run as they are at a fit."""
         index = self.member_columns(f.members)
         white = [W.exchanged(index, own) for W, own in zip(self.white, f.white, strict=True)]
-        if f.pushed:
-            white = [W.exchanged(f.pushed, self.whitened(k, self.farther(f)[k])) for k, W in enumerate(white)]
+        if f.farther is not None:
+            pushed = np.flatnonzero(f.farther > 1.0)
+            white = [W.exchanged(pushed, self._pushed(k, f.farther)) for k, W in enumerate(white)]
         return white
+
+    def _pushed(self, k: int, farther: Floats) -> Floats:
+        """White columns (w, p) of run k that bend the machine farther (k,) than at nominal: the tip moves more, the force is the same."""
+        pushed = np.flatnonzero(farther > 1.0)
+        out: Floats = self.white[k][:, pushed]
+        tip = np.isfinite(self.inflate[k][:, :3]) & np.isfinite(self.noise.sigma[k, :3])
+        out[: int(tip.sum())] *= farther[pushed]
+        return out
 
     def _readings(
         self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]

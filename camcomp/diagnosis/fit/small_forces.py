@@ -1,52 +1,27 @@
-"""Small forces on a machine that its causes have made soft: there they push it farther than at nominal.
-
-Where a screw is six times as soft as stated, friction that every healthy guide has bends it six times as far: a column at
-nominal has no room for that, and play would be named for it.
+"""Small forces on a machine that its causes have made soft: friction that every healthy guide has bends a screw that is six
+times as soft as stated six times as far.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of
+from camcomp.diagnosis.fit.columns import Columns
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
-from camcomp.model.motion.twin import Reading
 from camcomp.model.signal_path import pushes, stages_of
 
-SOFT = 0.5  # of a stated spring: on one that is not softer, what small forces do more is as small as they are
 
-
-def small_forces(
-    candidates: Sequence[CandidateCause], members: Sequence[int], causes: Sequence[Cause]
-) -> tuple[int, ...]:
-    """Candidates outside of the members that load springs which the members' causes make SOFT."""
-    changed = [(cause, candidates[i].parameters[0]) for i, cause in zip(members, causes, strict=True)]
-    soft = {
-        cause.target
-        for cause, p in changed
-        if p.log and "structure" in stages_of(cause.effect) and cause.values[p.name] < SOFT * p.nominal
-    }
-    return tuple(
-        i
-        for i, each in enumerate(candidates)
-        if i not in members
-        and pushes(each.effect)
-        and not any(p.placed for p in each.shapes)
-        and (None in soft or (soft and each.target in {*soft, None}))
-    )
-
-
-def pushed_farther(
-    bench: Bench,
-    causes: Sequence[Cause],
-    readings: Sequence[Reading],
-    beside: Sequence[tuple[CandidateCause, Mapping[str, float]]],
-) -> tuple[Floats, ...]:
-    """Per run (n, c, p): columns of candidates with their shapes on the machine that the causes make, which readings are of."""
-    found = []
-    for candidate, shape in beside:
-        for p in candidate.parameters:
-            more, unit = cause_of(candidate, {**shape, p.name: step_of(p)}), step_of(p) / p.scale
-            found.append([bench.change(k, bench.read(k, [*causes, more]), r) / unit for k, r in enumerate(readings)])
-    return tuple(np.stack([each[k] for each in found], axis=2) for k in range(len(readings)))
+def bent_farther(columns: Columns, members: Sequence[int], causes: Sequence[Cause]) -> Floats:
+    """How many times as far as at nominal the forces of other candidates bend the machine that the causes make: (k,) >= 1."""
+    out = np.ones(len(columns.names))
+    for i, cause in zip(members, causes, strict=True):
+        p = columns.candidates[i].parameters[0]
+        if not p.log or "structure" not in stages_of(cause.effect):
+            continue
+        for j, each in enumerate(columns.candidates):
+            loads = pushes(each.effect) and not any(shape.placed for shape in each.shapes)
+            if j not in members and loads and (each.target in (cause.target, None) or cause.target is None):
+                own = columns.of(j)
+                out[own] = np.maximum(out[own], p.nominal / cause.values[p.name])
+    return out

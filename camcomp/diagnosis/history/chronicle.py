@@ -106,10 +106,9 @@ def _standards(kept: Sequence[Kept]) -> Iterator[StandardCourse]:
 
 def _verdict(kept: Kept) -> DatedVerdict:
     result = kept.result
-    names = (f"{c.effect} ({c.target})" if c.target else c.effect for c in result.causes)
     return DatedVerdict(
         day=kept.day, verdict=result.verdict, gap_rms_um=result.gap.rms_um, floor_um=result.gap.noise_floor_um,
-        causes=tuple(names),
+        causes=tuple(each.label for each in result.causes),
     )  # fmt: skip
 
 

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from camcomp.diagnosis.law.words import listed
 from camcomp.diagnosis.report.words import depends, percent, plain, remedy, shortened, sizes, term_size
-from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, FoundCause, GapSize, Law, NamedCause
+from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, FoundCause, GapSize, Law
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.report.plot import brief, micrometres
 
 SURE = 0.95  # probability from which it is not printed
 MOST_CAUSES = 3  # causes printed on the terminal
 MOST_LINES = 10  # lines on the terminal; outcomes beyond them are on the page only
-
-
-def cause_name(cause: NamedCause) -> str:
-    """`effect (target)`."""
-    return f"{cause.effect} ({cause.target})" if cause.target else cause.effect
 
 
 def verdict_text(result: DiagnosisResult) -> str:
@@ -30,7 +25,7 @@ def verdict_text(result: DiagnosisResult) -> str:
     )
     if not result.known and result.verdict == UNKNOWN:
         told = f"The gap is {micrometres(gap.rms_um)} (rms), the noise floor {floor}."
-    known = [cause_name(each) for each in result.known]
+    known = [each.label for each in result.known]
     if result.verdict == "none":
         return (
             f"Measurement and model differ by {micrometres(gap.rms_um)} (rms), which is no more than noise (floor {floor}): "
@@ -39,13 +34,13 @@ def verdict_text(result: DiagnosisResult) -> str:
     if result.verdict == "identified":
         return f"{listed(known)} {'explain' if len(known) > 1 else 'explains'} the gap. {told}"
     if result.verdict == "ambiguous":
-        sets = [listed([cause_name(each) for each in one]) or "nothing but noise" for one in result.alternatives]
+        sets = [listed([each.label for each in one]) or "nothing but noise" for one in result.alternatives]
         return f"These runs cannot tell apart: {'; or '.join(sets)}. {told}"
-    known = [cause_name(each) for each in result.known if each.probability > EVEN]
-    maybe = [cause_name(each) for each in result.known if each.probability <= EVEN]
+    known = [each.label for each in result.known if each.probability > EVEN]
+    maybe = [each.label for each in result.known if each.probability <= EVEN]
     if len(known) > MOST_CAUSES:
         strongest = [each for each in by_share(result) if each.probability > EVEN][:MOST_CAUSES]
-        known = [*(cause_name(each) for each in strongest), f"{len(known) - MOST_CAUSES} more"]
+        known = [*(each.label for each in strongest), f"{len(known) - MOST_CAUSES} more"]
     subject = "The rest" if known else "It"
     rest = f" {listed(known)} {'are' if len(known) > 1 else 'is'} identified." if known else ""
     rest += f" {listed(maybe[:MOST_CAUSES])} may be a part of it." if maybe else ""
@@ -97,7 +92,7 @@ def answer_lines(result: DiagnosisResult) -> list[str]:
     for cause in told:
         size = f"; {found}" if (found := sizes(cause)) else ""
         share = f"{percent(cause.share)} of the gap{probability_text(cause.probability)}"
-        lines.append(f"  {cause_name(cause)}: {plain(cause)}{size}; {share}")
+        lines.append(f"  {cause.label}: {plain(cause)}{size}; {share}")
         if result.verdict != "ambiguous" and (what := remedy(cause)):
             lines.append(f"    do: {what}")
     if more := by_share(result)[len(told) :]:

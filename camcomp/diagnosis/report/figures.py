@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.diagnosis.report.answer import cause_name
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView, likeness, rms, spectrum
 from camcomp.diagnosis.report.words import percent
 from camcomp.diagnosis.result.types import FoundCause, UnseenShrinkage, Where
@@ -29,7 +28,7 @@ from camcomp.report.plot import (
 
 def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
     """The gap on withheld runs with one cause after the other added to the model; floor: noise floor, um, or None."""
-    names = ["as it was", *(f"+ {cause_name(step)}" for step in shrink.steps)]
+    names = ["as it was", *(f"+ {step.label}" for step in shrink.steps)]
     values = [shrink.before_rms_um, *(step.after_rms_um for step in shrink.steps)]
     bars = _bars(values[::-1], names[::-1], [f"{brief(v)} µm" for v in values[::-1]])
     style = {"color": STYLES[1][0], "dash": "dot", "width": 2}
@@ -196,14 +195,14 @@ def figure_spectrum(view: RunView) -> Figure | None:
 def figure_causes(causes: Sequence[FoundCause]) -> Figure:
     """Probability of every cause and its share of the gap."""
     shown = causes[::-1]
-    names = [cause_name(each) for each in shown]
+    names = [each.label for each in shown]
     sizes = {"share of the gap": [c.share for c in shown], "probability": [c.probability for c in shown]}
     bars = []
     for i, (label, size) in enumerate(sizes.items()):
         marker = {"color": STYLES[2 * (1 - i)][0], "pattern": {"shape": "" if i else "/"}}
         bar = _bars([100.0 * each for each in size], names, [percent(each) for each in size])
         bars.append(bar | {"name": label, "marker": marker, "showlegend": True})
-    words = ", ".join(f"{cause_name(c)} {100 * c.probability:.0f} %" for c in causes)
+    words = ", ".join(f"{c.label} {100 * c.probability:.0f} %" for c in causes)
     return Figure(
         name="causes-plot",
         title="Causes by probability",

@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from camcomp.diagnosis.law.words import listed
-from camcomp.diagnosis.report.answer import by_share, cause_name, floor_text, probability_text, verdict_text
+from camcomp.diagnosis.report.answer import by_share, floor_text, probability_text, verdict_text
 from camcomp.diagnosis.report.circles import circles_section
 from camcomp.diagnosis.report.figures import (
     figure_causes,
@@ -152,7 +152,7 @@ def _causes(result: DiagnosisResult) -> Section:
 
 
 def _apart(result: DiagnosisResult, rivals: Sequence[RivalSignals], views: Sequence[RunView]) -> Section:
-    items = [listed([cause_name(each) for each in one]) for one in result.alternatives]
+    items = [listed([each.label for each in one]) for one in result.alternatives]
     figure = figure_rivals(rivals, views)
     return Section(
         name="apart",
@@ -178,7 +178,7 @@ def _to_do(result: DiagnosisResult, next_program: Listing | None) -> Section:
     rows: list[Row] = []
     for cause in by_share(result):
         share = percent(cause.share) + probability_text(cause.probability)
-        rows.append([f"{cause_name(cause)}: {plain(cause)}", sizes(cause), share, remedy(cause)])
+        rows.append([f"{cause.label}: {plain(cause)}", sizes(cause), share, remedy(cause)])
     tables = [Table("Causes and what helps", ("cause", "size", "share of the gap", "what to do"), rows)] if rows else []
     text = [NO_ACTION] if result.verdict == "none" else []
     if result.verdict == "ambiguous":

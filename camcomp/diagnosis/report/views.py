@@ -17,7 +17,6 @@ from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.answer import LawAnswer, rms_um, term_bench
 from camcomp.diagnosis.law.bench_terms import Spot
-from camcomp.diagnosis.report.answer import cause_name
 from camcomp.diagnosis.report.law_section import LawView
 from camcomp.diagnosis.report.page import diagnosis_html
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView
@@ -93,9 +92,9 @@ def rivals_of(done: Diagnosis) -> list[RivalSignals]:
         return []
     part = main_channels(problem)
     out = []
-    for fit in (found.sets.best, *(found.sets.fits[j] for j in found.sets.ranking.rivals)):
+    for fit in (found.sets.best, *(found.sets.fits[j] for j in found.sets.rivals)):
         causes = problem.causes(fit.members, fit.theta, fit.extra)
-        names = [cause_name(NamedCause(effect=each.name, target=each.target)) for each in causes]
+        names = [NamedCause(effect=each.name, target=each.target).label for each in causes]
         signals = tuple(
             1e3 * (problem.bench.gap(k) - problem.bench.gap(k, causes))[:, part] for k in range(len(problem.bench.runs))
         )

@@ -149,6 +149,11 @@ class NamedCause(Result):
     effect: str
     target: str | None
 
+    @property
+    def label(self) -> str:
+        """`effect (target)`."""
+        return f"{self.effect} ({self.target})" if self.target else self.effect
+
 
 class Estimate(Result):
     """A value with its 95 % interval."""

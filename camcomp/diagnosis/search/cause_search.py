@@ -24,31 +24,10 @@ from camcomp.diagnosis.statistics.cause_sets import (
 )
 from camcomp.diagnosis.statistics.evidence import misfit
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
-from camcomp.diagnosis.statistics.ranking import Ranking, rank
+from camcomp.diagnosis.statistics.ranking import RankedSets, rank
 from camcomp.diagnosis.statistics.score_test import ResidualTest
-from camcomp.ground.datatypes import Floats
 
 LEFT_OPEN = 0.25  # of what causes explain together: no set explains what leaves more, however large its members are
-
-
-@dataclass(frozen=True, eq=False)
-class RankedSets:
-    """Sets that are answers with their probabilities at a temperature, and the ranking among them."""
-
-    fits: tuple[Fitted, ...]
-    probability: Floats
-    ranking: Ranking
-    temperature: float
-
-    @property
-    def best(self) -> Fitted:
-        """The leading set."""
-        return self.fits[self.ranking.best]
-
-    @property
-    def rivals(self) -> list[int]:
-        """Indices of the sets that explain the data as well, the most probable first."""
-        return sorted(self.ranking.rivals, key=lambda j: -self.probability[j])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,9 +45,9 @@ class CauseSearch:
 def search_causes(problem: Problem) -> CauseSearch:
     """Fit sets, rank them, test the best one for an unmodelled effect, and state probabilities."""
     fitted = FittedSets(problem)
-    ranked = _rank_answers(problem, fitted)
+    ranked, temperature = _rank_answers(problem, fitted)
     kept = _keep_causes(problem, ranked.best, fitted)
-    ranked = _with_answer(problem, ranked, kept.known)
+    ranked = _with_answer(problem, ranked, kept.known, temperature)
     stated = _stated(ranked, kept)
     left, kind = _describe_residual(problem, kept)
     return CauseSearch(
@@ -76,8 +55,8 @@ def search_causes(problem: Problem) -> CauseSearch:
     )
 
 
-def _rank_answers(problem: Problem, sets: FittedSets) -> RankedSets:
-    """Sets without small members, with their probabilities and ranking."""
+def _rank_answers(problem: Problem, sets: FittedSets) -> tuple[RankedSets, float]:
+    """Sets without small members, ranked, and the temperature of their probabilities."""
     best = sets.null
     for _ in range(ROUNDS):
         sets.search_near(best)
@@ -88,7 +67,7 @@ def _rank_answers(problem: Problem, sets: FittedSets) -> RankedSets:
         best = fits[int(np.argmax(probability))]
         if best.members in sets.searched:
             break
-    return RankedSets(fits, probability, rank(fits, probability, _same(problem, fits, best)), temperature)
+    return rank(fits, probability, _same(problem, fits, best)), temperature
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,13 +114,13 @@ def _keep_causes(problem: Problem, best: Fitted, sets: FittedSets) -> _Kept:
     return _Kept(f, present, beyond, kind, bool(above_floor(problem, beyond)))
 
 
-def _with_answer(problem: Problem, sets: RankedSets, known: Fitted) -> RankedSets:
+def _with_answer(problem: Problem, sets: RankedSets, known: Fitted, temperature: float) -> RankedSets:
     """The sets with the answer that stays at their head."""
     if known.members == sets.best.members:
         return sets
     fits = (known, *(f for f in sets.fits if f.members != known.members))
-    probability = probabilities(fits, problem.candidates, sets.temperature)
-    return replace(sets, fits=fits, probability=probability, ranking=replace(sets.ranking, best=0, rivals=()))
+    probability = probabilities(fits, problem.candidates, temperature)
+    return replace(sets, fits=fits, probability=probability, first=0, rivals=())
 
 
 def _stated(sets: RankedSets, kept: _Kept) -> dict[int, float]:
@@ -150,7 +129,7 @@ def _stated(sets: RankedSets, kept: _Kept) -> dict[int, float]:
     Where withheld runs exceed the floor causes share what the prior of a discrepancy of any form leaves.
     """
     # the posterior of the sets lacks causes that are seen only jointly with something unmodelled
-    posterior = dict.fromkeys(kept.known.members, 1.0) | sets.ranking.inclusion
+    posterior = dict.fromkeys(kept.known.members, 1.0) | sets.inclusion
     posterior = {i: min(p, kept.credible.get(i, 1.0)) for i, p in posterior.items()}
     calibrate = calibration_of("programs").calibrate
     open_to_others = kept.kind is not None or kept.above_floor
@@ -162,7 +141,7 @@ def _verdict(sets: RankedSets, stated: Mapping[int, float], kind: str | None) ->
     return decide(
         VerdictInputs(
             unknown=float(kind is not None), best=min((stated[i] for i in sets.best.members), default=1.0),
-            alternatives=len(sets.ranking.rivals), causes=len(sets.best.members), known_noise=True, confirmed=True,
+            alternatives=len(sets.rivals), causes=len(sets.best.members), known_noise=True, confirmed=True,
         )
     )  # fmt: skip
 

@@ -137,15 +137,8 @@ def _weights(problem: Problem) -> list[list[float]]:
 
     An encoder resolves a hundredth of it, and every model is wrong by more.
     """
-    bench, m, out = problem.bench, len(problem.bench.actuators), []
-    springs = np.array([np.inf if a.stiffness is None else a.stiffness for a in bench.twin.robot.actuators])
-    for k, sigma in enumerate(problem.noise.sigma):
-        way = np.sqrt(np.mean(np.sum(bench.row_slopes(k) ** 2, axis=1), axis=0))  # (m,) of the tip per way of a drive
-        at_tip = {"encoder": sigma[3 : 3 + m] * way, "drive": sigma[3 + m : 3 + 2 * m] / springs * way}
-        own = []
-        for words in problem.dictionaries:
-            seen = at_tip.get(words.kind, np.full(1, np.inf))
-            size = 1e3 * float(np.median(seen[np.isfinite(seen)])) if np.isfinite(seen).any() else np.inf
-            own.append(min(1.0, size / (MINOR * problem.floor.tip_um)))
-        out.append(own)
-    return out
+    noise_um = 1e3 * problem.noise.sigma * problem.bench.tip_sizes
+    kinds = [noise_um[:, problem.channels_of(words.kind)] for words in problem.dictionaries]
+    size = [np.nanmedian(np.where(each > 0.0, each, np.nan), axis=1) for each in kinds]
+    least = np.minimum(np.nan_to_num(size, nan=np.inf) / (MINOR * problem.floor.tip_um), 1.0)
+    return [each.tolist() for each in least.T]

@@ -69,11 +69,10 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
     index = problem.member_columns(f.members)
     usual = estimate(total(f.grams), problem.prior, index)[0]
     usual[index] = 0.0
-    if f.pushed:
-        pushed = list(f.pushed)
-        left = left - problem.farther(f)[k] @ usual[pushed]
-        usual[pushed] = 0.0
-    return np.asarray(left - (problem.columns.blocks[k] @ usual).reshape(left.shape[1], -1).T)
+    moved = (problem.columns.blocks[k] @ usual).reshape(left.shape[1], -1)
+    if f.farther is not None:
+        moved[:3] = (problem.columns.blocks[k] @ (usual * f.farther)).reshape(left.shape[1], -1)[:3]
+    return np.asarray(left - moved.T)
 
 
 def undetermined(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
@@ -87,26 +86,10 @@ def undetermined(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
 
 def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
     """Residuals (n, 3) of one kind of channel, mm at the tip, of run k."""
-    bench, run = problem.bench, problem.bench.runs[k]
-    m = len(bench.actuators)
-    if kind == "tip":
-        return left[:, :3]
-    slopes = bench.slopes[k].at(run.run_path.row_place)
-    if kind == "dyno":
-        ways = slopes.tip_wrench[:, :, :3]
-        lever = bench.twin.nominal.tool
-        turned = slopes.tip_wrench[:, :, 3:]
-        cross = np.array([[0.0, -lever[2], lever[1]], [lever[2], 0.0, -lever[0]], [-lever[1], lever[0], 0.0]])
-        ways = ways + turned @ cross
-        part = left[:, 3 + 2 * m :]
-    else:
-        ways = slopes.tip_rho
-        part = left[:, 3 : 3 + m] if kind == "encoder" else left[:, 3 + m : 3 + 2 * m]
-        if kind == "drive":
-            springs = np.array([np.inf if a.stiffness is None else a.stiffness for a in bench.twin.robot.actuators])
-            part = part / springs
-    ways = thinned(ways.reshape(len(ways), -1), run.thin).reshape(-1, 3, part.shape[1])
-    return np.asarray(np.einsum("nij,nj->ni", ways, part))
+    channels = problem.channels_of(kind)
+    ways = problem.bench.at_tip(k)[:, :, channels]
+    ways = thinned(ways.reshape(len(ways), -1), problem.bench.runs[k].thin).reshape(-1, *ways.shape[1:])
+    return np.asarray(np.einsum("nij,nj->ni", ways, left[:, channels]))
 
 
 def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:
@@ -117,7 +100,9 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
     weight: list[Floats] = []
     for k, values in enumerate(at_tip):
         t = problem.times[k]
-        inflate = _inflation(problem, k, kind, values)
+        inflate = problem.inflate[k][:, problem.channels_of(kind)]
+        if kind != "tip":  # each channel moves the tip along its own way: the worst of them counts
+            inflate = np.repeat(np.nanmax(np.nan_to_num(inflate, nan=1.0), axis=1)[:, None], 3, axis=1)
         values = np.where(inflate < 3.0, values, np.nan)
         noise = np.array([row_scatter(x, t) for x in values.T])
         noise = np.where(np.isfinite(noise), noise, 0.0)
@@ -144,15 +129,6 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
     mean = float((np.sum(w * e, axis=0) / whole).sum())
     doubt = float(np.sqrt(2.0 * np.sum(np.sum((w * v) ** 2, axis=0) / whole**2))) + TINY
     return Unexplained(kind, 1e3 * float(np.sqrt(max(mean, 0.0))), mean / doubt)
-
-
-def _inflation(problem: Problem, k: int, kind: str, values: Floats) -> Floats:
-    """How much less certain than their noise the values (n, 3) of one kind in run k are, >= 1."""
-    if kind == "tip":
-        return problem.inflate[k][:, :3]
-    if kind == "encoder":  # each moves the tip along its own way: the worst of them counts
-        return np.repeat(problem.late_drives[k].max(axis=1)[:, None], 3, axis=1)
-    return np.ones_like(values)
 
 
 def worst(left: Mapping[str, Unexplained]) -> Unexplained:

@@ -2,7 +2,7 @@
 library?
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -108,16 +108,16 @@ def foretelling(problem: Problem, f: Fitted) -> Members:
     as well.
     """
     members = f.members
-    if len(problem.bench.runs) < 2:
-        return members
-    while members:
-        now = _unforetold(problem, f, members)
-        own = [_own(problem, f, members, i) for i in members]
+    while members and len(problem.bench.runs) > 1:
+        now = _left_unseen(problem, f, members)
         gains = [
             (CONFIRMED if followed(problem, f, i) else 0.0)
             if problem.passing(i)
-            else _gain(_unforetold(problem, f, tuple(each for each in members if each != i)), now, signal)
-            for i, signal in zip(members, own, strict=True)
+            else _gain(
+                _left_unseen(problem, f, tuple(each for each in members if each != i)) - now,
+                _own(problem, f, members, i),
+            )
+            for i in members
         ]
         if min(gains) >= CONFIRMED:
             break
@@ -148,63 +148,41 @@ def followed(problem: Problem, f: Fitted, i: int) -> bool:
     return not len(rows) or float(rows.mean()) >= CONFIRMED
 
 
-def _gain(before: Mapping[str, Floats], after: Mapping[str, Floats], own: Mapping[str, Floats]) -> float:
-    """Share of its own signal that a member takes away from unseen runs, in the kind of channel that shows it best."""
-    kind = max(own, key=lambda each: float(own[each].sum()))
-    change, whole = before[kind] - after[kind], own[kind]
-    seen = whole > SEEN_SHARE * whole.max(initial=0.0)
+def _gain(change: Floats, own: Floats) -> float:
+    """Share of its own signal (runs,) that a member takes away from unseen runs; no run may speak against it."""
+    seen = own > SEEN_SHARE * own.max(initial=0.0)
     if not seen.any():
         return 0.0
-    # no run may speak against it
-    return min(float(change[seen].sum() / whole[seen].sum()), 1.0 + float(np.min(change[seen] / whole[seen])))
+    return min(float(change[seen].sum() / own[seen].sum()), 1.0 + float(np.min(change[seen] / own[seen])))
 
 
-def _own(problem: Problem, f: Fitted, members: Members, i: int) -> dict[str, Floats]:
-    """Energy per row (runs,) and kind of channel that a member explains and the other members cannot.
+def _own(problem: Problem, f: Fitted, members: Members, i: int) -> Floats:
+    """Squares per row (runs,) that a member explains and the other members cannot.
 
     Where they would take over more than OWN of it, the others may be what is there, and all that it does counts.
     """
     index, at = problem.member_columns((i,)), problem.member_columns(f.members)
     others = problem.member_columns(tuple(each for each in members if each != i))
-    theta = f.theta[[at.index(c) for c in index]]
-    A = total(f.grams).A
-    instead = np.linalg.solve(A[np.ix_(others, others)] + np.eye(len(others)), A[np.ix_(others, index)] @ theta)
-    white = about(problem, f)[0]
-    whole = _energies(problem, [W[:, index] @ theta for W in white])
-    own = _energies(problem, [W[:, index] @ theta - W[:, others] @ instead for W in white])
-    return own if sum(map(np.sum, own.values())) > OWN * sum(map(np.sum, whole.values())) else whole
+    A, signal = total(f.grams).A, np.zeros(len(problem.columns.names))
+    signal[index] = f.theta[[at.index(c) for c in index]]
+    alone = signal.copy()
+    alone[others] -= np.linalg.solve(A[np.ix_(others, others)] + np.eye(len(others)), A[others] @ signal)
+    whole, own = ([float(each @ g.A @ each) / g.rows for g in f.grams] for each in (signal, alone))
+    return np.array(own if sum(own) > OWN * sum(whole) else whole)
 
 
-def _energies(problem: Problem, rows: Sequence[Floats]) -> dict[str, Floats]:
-    """Mean square (runs,) of white rows (w,) of every run, per kind of channel."""
-    out: dict[str, list[float]] = {words.kind: [] for words in problem.dictionaries}
-    for values, parts in zip(rows, problem.white_patterns, strict=True):
-        first = 0
-        for kind, part in zip(out, parts, strict=True):
-            out[kind].append(float(np.mean(values[first : first + len(part)] ** 2)) if len(part) else 0.0)
-            first += len(part)
-    return {kind: np.array(each) for kind, each in out.items()}
+def _left_unseen(problem: Problem, f: Fitted, members: Members) -> Floats:
+    """Squares per row (runs,) that members of a set leave of runs that they were not fitted to.
 
-
-def _unforetold(problem: Problem, f: Fitted, members: Members) -> dict[str, Floats]:
-    """Energy per row (runs,) that members of a set leave of runs that they were not fitted to, per kind of channel.
-
-    Beyond noise, beyond what runs differ by anyway, and beyond what the doubt about the members' amplitudes makes.
+    Beyond what the doubt about the members' amplitudes makes; frames and clocks that are a run's own are fitted to it.
     """
-    index, offsets = problem.member_columns(members), problem.columns.run_offsets
-    free = problem.columns.of_labels
-    whole = total(f.grams)
-    out: dict[str, list[float]] = {words.kind: [] for words in problem.dictionaries}
-    for g, W, r, parts in zip(f.grams, *about(problem, f), problem.white_patterns, strict=True):
+    index, free, whole, out = problem.member_columns(members), problem.columns.of_labels, total(f.grams), []
+    for g in f.grams:
         mean, covariance = estimate(whole - g, problem.prior, index)
-        rest = r - W[:, index] @ mean[index]
-        if len(free):  # frames and clocks that are a run's own
-            rest = rest - W[:, free] @ np.linalg.lstsq(W[:, free], rest, rcond=None)[0]
-        doubt = np.sum((W[:, index] @ covariance[np.ix_(index, index)]) * W[:, index], axis=1)
-        doubt += np.sum((W[:, offsets] * problem.prior.tolerance[offsets]) ** 2, axis=1)
-        energy = rest**2 - doubt - 1.0
-        at = 0
-        for kind, part in zip(out, parts, strict=True):
-            out[kind].append(float(np.mean(energy[at : at + len(part)])) if len(part) else 0.0)
-            at += len(part)
-    return {kind: np.array(each) for kind, each in out.items()}
+        own = mean[index]
+        A, b = g.A[np.ix_(index, index)], g.b[index]
+        square = own @ A @ own - 2.0 * b @ own - float(np.sum(A * covariance[np.ix_(index, index)]))
+        toward = g.b[free] - g.A[free][:, index] @ own
+        square -= toward @ np.linalg.lstsq(g.A[np.ix_(free, free)], toward, rcond=1e-12)[0]
+        out.append((g.c + square) / g.rows)
+    return np.array(out)

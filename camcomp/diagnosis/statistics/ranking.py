@@ -11,17 +11,26 @@ from camcomp.ground.datatypes import Floats
 
 
 @dataclass(frozen=True, eq=False)
-class Ranking:
-    """best: index of the leading set. rivals: indices of sets that explain the data as well. inclusion: probability of every
-    candidate that any fitted set has.
+class RankedSets:
+    """Fitted sets that are answers with their probabilities (n,).
+
+    first: index of the leading set. rivals: of those that explain the data as well, the most probable first. inclusion:
+    probability of every candidate that any set has.
     """
 
-    best: int
+    fits: tuple[Fitted, ...]
+    probability: Floats
+    first: int
     rivals: tuple[int, ...]
     inclusion: dict[int, float]
 
+    @property
+    def best(self) -> Fitted:
+        """The leading set."""
+        return self.fits[self.first]
 
-def rank(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Members, Members]]) -> Ranking:
+
+def rank(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Members, Members]]) -> RankedSets:
     """The ranking of fits by their probabilities; twins: pairs of sets that the data cannot tell apart.
 
     Twins of the best set and itself have equal parts of their common probability: neither a prior nor other sets break that tie.
@@ -47,4 +56,4 @@ def rank(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Memb
             inclusion[i] = inclusion.get(i, 0.0) + float(p)
     for i in leader.members:
         inclusion[i] = min(inclusion[i], sum(i in fits[j].members for j in twin) / len(twin))
-    return Ranking(best, tuple(rivals), inclusion)
+    return RankedSets(tuple(fits), probability, best, tuple(rivals), inclusion)

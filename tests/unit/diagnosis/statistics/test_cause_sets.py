@@ -99,7 +99,7 @@ def test_a_rival_is_another_set_that_is_neither_larger_nor_the_same_with_one_mor
 def test_twins_have_equal_parts_of_their_probability_whatever_their_priors():
     fits = [fitted(0), fitted(1), fitted(2)]
     ranking = rank(fits, np.array([0.97, 0.02, 0.01]), [((0,), (1,))])
-    assert (ranking.best, ranking.rivals) == (0, (1,))
+    assert (ranking.first, ranking.rivals) == (0, (1,))
     assert (ranking.inclusion[0], ranking.inclusion[1]) == pytest.approx((0.495, 0.495))
 
 
