@@ -12,7 +12,7 @@ from camcomp.diagnosis.fit.bench import Bench
 from camcomp.diagnosis.next_experiment.candidates import by_other_means, candidate, coarse, single_changes, usual
 from camcomp.diagnosis.next_experiment.design import MotionDesign
 from camcomp.diagnosis.next_experiment.ready_program import CUTS, ready_program
-from camcomp.diagnosis.next_experiment.site import commanded, room_of, site_of
+from camcomp.diagnosis.next_experiment.site import commanded, site_of
 from camcomp.gcode.interpret import read_program
 from camcomp.ground import path_geometry
 from camcomp.ground.errors import CheckFailed
@@ -35,8 +35,8 @@ def bench(opened):
 
 @pytest.fixture(scope="module")
 def every(opened, bench):
-    site, room = site_of(bench), room_of(bench, opened.job)
-    return [*coarse(site, room), *by_other_means(site), *single_changes(site, room)]
+    site = site_of(bench, opened.job)
+    return [*coarse(site), *by_other_means(site), *single_changes(site)]
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +45,9 @@ def proposals(opened, every):
 
 
 @pytest.fixture(scope="module")
-def first(bench):
-    return candidate(site_of(bench), usual(site_of(bench)))
+def first(opened, bench):
+    site = site_of(bench, opened.job)
+    return candidate(site, usual(site))
 
 
 def test_every_experiment_is_a_program_that_a_machine_can_run(proposals):

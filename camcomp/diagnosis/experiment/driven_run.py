@@ -77,8 +77,8 @@ class Logged:
     temperature: Floats | None
     acceleration: float
 
-    def refuse(self, rule: str, message: str) -> ConfigError:
-        """The error of this log."""
+    def refusal(self, rule: str, message: str) -> ConfigError:
+        """The error of a rule in this log."""
         return ConfigError(rule, f"run '{self.run}'{message}", at=Location(self.file, 1, 1))
 
     def path(self, rho: Floats, tip: Floats, forces: Forces, rotation: Floats | None) -> RunPath:
@@ -166,7 +166,7 @@ def _channel(log: Logged, *, has_program: bool) -> str:
     """Channel of the motion: set-points, else encoders, else the tip along a program. Raises ConfigError CC402."""
     by = next((each for each in ("setpoint", "encoder", "tip") if log.measured.has(each)), "")
     if not by or (by == "tip" and not has_program):
-        raise log.refuse("CC402", " has neither a program nor set-points: the commanded motion is unknown")
+        raise log.refusal("CC402", " has neither a program nor set-points: the commanded motion is unknown")
     return by
 
 
@@ -174,7 +174,7 @@ def _commanded(log: Logged, by: str) -> tuple[Floats, Bools]:
     """Actuators (n, m) of the channel `by` over time, and a mask (n, m) of those that are unknown. Raises CC404."""
     logged, time = getattr(log.measured, by), log.measured.time
     if np.isfinite(logged).sum(axis=0).min() < 2:
-        raise log.refuse("CC404", f": hardly a row holds the {by} of every actuator")
+        raise log.refusal("CC404", f": hardly a row holds the {by} of every actuator")
     guessed = [
         _guessed(time, v, GUESSED_RAD if a.revolute else GUESSED_MM)
         for v, a in zip(logged.T, log.twin.robot.actuators, strict=True)
@@ -257,7 +257,7 @@ def _near(log: Logged, rho: Floats, program: _Program | None) -> tuple[Floats, F
         return program.tips[index], None if program.rotation is None else program.rotation[index]
     known = np.asarray(np.isfinite(log.measured.tip).all(axis=1))
     if not known.any():
-        raise log.refuse("CC402", " has neither a program nor measured tips: its place is not known")
+        raise log.refusal("CC402", " has neither a program nor measured tips: its place is not known")
     return log.over_time(log.measured.tip, known), None
 
 
@@ -270,7 +270,7 @@ def _aligned(log: Logged, program: _Program, tip: Floats, aside_mm: float = ASID
     known = np.isfinite(line) & (line > 0)
     if known.any() and not np.isin(line[known], path.line).any():
         lines = sorted({int(each) for each in line[known]})[:5]
-        raise log.refuse("CC406", f": the rows are on lines that the program does not move on, e.g. {lines}")
+        raise log.refusal("CC406", f": the rows are on lines that the program does not move on, e.g. {lines}")
     found = align(path, tip, line, max(aside_mm, LOST_MM))
     check_followed(log.file, log.run, found.distance[places(tip)], _agreement(path, found, tip), aside_mm)
     if aside_mm <= ASIDE_MM:
@@ -434,7 +434,11 @@ def _across(path: Path, aligned: Aligned, velocity: Floats) -> Floats:
     along = path_geometry.tangents(path, aligned.motion, aligned.share)
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
     along = np.where(speed > STANDING_MM_PER_S, velocity / np.maximum(speed, 1e-12), along)
-    other = np.where(along[:, 2:3] ** 2 < 0.5, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    side = np.cross(along, other)
+    return axes_along(along)
+
+
+def axes_along(along: Floats) -> Floats:
+    """Axes (n, 3, 3) of unit directions (n, 3): along, and two across."""
+    side = np.cross(along, np.eye(3)[np.argmin(np.abs(along), axis=1)])
     side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
     return np.stack([along, side, np.cross(along, side)], axis=1)

@@ -10,23 +10,28 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from camcomp.diagnosis.fit.bench import CandidateCause
 from camcomp.diagnosis.law.describe import where_of
 from camcomp.diagnosis.result.types import Law, LawPart
+from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.ground.files import display_name, read_bytes, write_all
-from camcomp.model.effect import Load, Motion, Parameter
-from camcomp.model.law.covariates import DriveRows, TipRows, load_of
+from camcomp.model.effect import Parameter
+from camcomp.model.law.covariates import load_of
 from camcomp.model.law.expression import FormulaError
 from camcomp.model.law.law import EmpiricalLaw
 from camcomp.model.law.spec import FormulaSpec, MapSpec
 
+_HOOKS = {"control": "on_servo", "drive": "on_drive"}  # by stage; all others move the tip
 _SOURCE = "the law found before, 1: as large as there"
 
 
@@ -66,12 +71,13 @@ class LearnedLaw:
         laws = [_placed(part, size) for part, size in pieces]
         if any(load_of(name) not in (None, *actuators) for law in laws for name in law.shape.names):
             return None
-        at = [None if part.target is None else list(actuators).index(part.target) for part, _ in pieces]
-        placed = [_Piece(p.name, law, j) for p, law, j in zip(self.parameters, laws, at, strict=True)]
-        stages = {"control": _OnControl, "drive": _OnDrive}
-        kinds = tuple(dict.fromkeys(stages.get(law.on, _OnTip) for law in laws))
-        effect = type("LearnedEffect", kinds, {"__doc__": self.law.says})(placed)
-        effect.STAGE, effect.PARAMETERS = self.law.on, self.parameters
+        which = [np.array([a == part.target for a in actuators], float) for part, _ in pieces]
+        placed = [_Piece(p.name, law, own) for p, law, own in zip(self.parameters, laws, which, strict=True)]
+        effect = SimpleNamespace(
+            TARGET="machine", SOURCE=_SOURCE, STAGE=self.law.on, PARAMETERS=self.parameters, __doc__=self.law.says
+        )
+        for hook in dict.fromkeys(_HOOKS.get(law.on, "on_place") for law in laws):
+            setattr(effect, hook, partial(_in_turn, hook, placed))
         return CandidateCause(self.name, None, effect)
 
     def entries(self, factors: Mapping[str, float]) -> list[dict[str, Any]]:
@@ -89,53 +95,24 @@ class LearnedLaw:
         return out
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Piece:
-    """A term at work: its factor's name, the law, and the index of its actuator."""
+    """A term at work: its factor's name, the law, and which actuators (m,) it moves."""
 
     factor: str
     law: EmpiricalLaw
-    actuator: int | None
+    which: Floats
 
 
-class _Learned:
-    """What effects of learned laws have in common."""
-
-    TARGET, SOURCE = "machine", _SOURCE
-    STAGE: str
-    PARAMETERS: tuple[Parameter, ...]
-
-    def __init__(self, pieces: Sequence[_Piece]) -> None:
-        self.pieces = pieces
-
-    def shifted(self, on: str, values: Floats, motion: Motion, p: Mapping[str, float]) -> Floats:
-        """Values (n, m) of actuators with the pieces on that stage."""
-        out = values
-        for each in self.pieces:
-            if each.law.on == on and each.actuator is not None and p[each.factor] != 0.0:
-                out = out.copy() if out is values else out
-                out[:, each.actuator] += p[each.factor] * each.law.values(DriveRows(motion, each.actuator))
-        return out
-
-
-class _OnControl(_Learned):
-    def on_servo(self, position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
-        return self.shifted("control", position, motion, p)
-
-
-class _OnDrive(_Learned):
-    def on_drive(self, error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
-        return self.shifted("drive", error, motion, p)
-
-
-class _OnTip(_Learned):
-    def on_place(self, tip: Floats, load: Load, motion: Motion, p: Mapping[str, float]) -> Floats:
-        rows, out = TipRows(tip, load, motion), tip
-        for each in self.pieces:
-            if each.actuator is None and p[each.factor] != 0.0:
-                out = out.copy() if out is tip else out
-                out[:, each.law.axis] += p[each.factor] * each.law.values(rows)
-        return out
+def _in_turn(hook: str, pieces: Sequence[_Piece], values: Floats, *given: Any) -> Floats:
+    """Values of a hook of the effect `formula`, of the pieces one after the other, each as large as its factor."""
+    *others, p = given
+    formula = getattr(shelf.load("effects", "formula"), hook)
+    for each in pieces:
+        if p[each.factor] != 0.0:
+            own = [others[0], each.which] if hook in _HOOKS.values() else others
+            values = formula(values, *own, {"law": replace(each.law, factor=p[each.factor] * each.law.factor)})
+    return values
 
 
 def _placed(part: LawPart, size: float) -> EmpiricalLaw:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.next_experiment.design import PLANES, MotionDesign
-from camcomp.diagnosis.next_experiment.site import Room, Site
+from camcomp.diagnosis.next_experiment.site import Site
 from camcomp.ground.datatypes import Floats
 
 LATER_S = 3600.0  # delay of a later run
@@ -81,7 +81,7 @@ def usual(site: Site) -> MotionDesign:
     )
 
 
-def coarse(site: Site, room: Room) -> Iterator[Candidate]:
+def coarse(site: Site) -> Iterator[Candidate]:
     """Coarse grid of designs: region of work, distant, large, other planes, straight, slow and fast, later."""
     base = usual(site)
     if site.cut is not None:
@@ -89,7 +89,7 @@ def coarse(site: Site, room: Room) -> Iterator[Candidate]:
         yield candidate(site, replace(base, radius=SMALL * base.radius))
     for times in FASTER:
         yield _air(site, base, feed=times * base.feed)
-    middle, ways, reaches = _reaches(site, room, base)
+    middle, ways, reaches = _reaches(site, base)
     for way, far in zip(ways, reaches, strict=True):
         for share in OUT if np.count_nonzero(way) == 1 else OUT[-1:]:
             if far > 0.0:
@@ -102,7 +102,7 @@ def coarse(site: Site, room: Room) -> Iterator[Candidate]:
             yield _air(site, base, radius=radius, plane=plane)
     diagonals = np.array([[0.5**0.5, 0.5**0.5, 0.0], [0.5**0.5, -(0.5**0.5), 0.0]])
     for line in np.concatenate([np.eye(3), diagonals]):
-        ends = OUT[-1] * room.reaches(middle, np.array([line, -line]), site.farther, site.low)
+        ends = OUT[-1] * site.room.reaches(middle, np.array([line, -line]), site.farther, site.low)
         if (half := 0.5 * float(ends.sum())) > 0.0:
             centre = middle + 0.5 * float(ends[0] - ends[1]) * line
             yield _air(site, base, centre=_triple(centre), radius=half, along=_triple(line))
@@ -130,7 +130,7 @@ def by_other_means(site: Site) -> Iterator[Candidate]:
         yield replace(base, action=action, minutes=base.minutes + cost, knows=((effect, parameter, deviation),))
 
 
-def single_changes(site: Site, room: Room) -> Iterator[Candidate]:
+def single_changes(site: Site) -> Iterator[Candidate]:
     """Repetitions of the runs with one covariate changed, for unknown causes."""
     base = usual(site)
     yield candidate(site, replace(base, turns=(-1,)), ("reversal", "direction"))
@@ -139,19 +139,19 @@ def single_changes(site: Site, room: Room) -> Iterator[Candidate]:
     yield candidate(site, replace(base, feed=0.5 * base.feed), ("velocity", "acceleration"))
     if base.cutting:
         yield _air(site, base, ("force",))
-    middle, ways, reaches = _reaches(site, room, base)
+    middle, ways, reaches = _reaches(site, base)
     far = float(reaches.max())
     centre = _triple(middle + (1.0 - SMALL) * far * ways[int(np.argmax(reaches))])
     yield _air(site, base, ("position",), centre=centre, radius=min(base.radius, SMALL * far))
     yield from in_time(site)
 
 
-def _reaches(site: Site, room: Room, base: MotionDesign) -> tuple[Floats, Floats, Floats]:
+def _reaches(site: Site, base: MotionDesign) -> tuple[Floats, Floats, Floats]:
     """Centre (3,) of a design in the air, unit directions (k, 3) along the axes and to the corners, and how far (k,) they reach."""
     every = np.array([w for w in product((1.0, 0.0, -1.0), repeat=3) if sum(map(abs, w)) in (1.0, 3.0)])
     ways = every / np.linalg.norm(every, axis=1)[:, None]
     middle = np.array(_in_air(site, replace(base, cutting=False)).centre)
-    return middle, ways, room.reaches(middle, ways, site.farther, site.low)
+    return middle, ways, site.room.reaches(middle, ways, site.farther, site.low)
 
 
 def _air(site: Site, base: MotionDesign, varies: tuple[str, ...] = (), **changes: Any) -> Candidate:

@@ -19,13 +19,11 @@ from camcomp.diagnosis.next_experiment.candidates import (
     coarse,
     single_changes,
 )  # fmt: skip
-from camcomp.diagnosis.next_experiment.design import MotionDesign
 from camcomp.diagnosis.next_experiment.information_gain import most_narrowed, predicted_gain, program_weight
-from camcomp.diagnosis.next_experiment.outcomes import after_unknown
-from camcomp.diagnosis.next_experiment.predicted_logs import Question, feasible, predict_logs
-from camcomp.diagnosis.next_experiment.proposal import WORTH, Proposal
+from camcomp.diagnosis.next_experiment.predicted_logs import Question, predict_logs
+from camcomp.diagnosis.next_experiment.proposal import WORTH, Proposal, after_unknown
 from camcomp.diagnosis.next_experiment.ready_program import can_be_run
-from camcomp.diagnosis.next_experiment.site import Room, Site, room_of, site_of
+from camcomp.diagnosis.next_experiment.site import Site, site_of
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 from camcomp.model.job import Job
@@ -39,13 +37,11 @@ class Desk:
 
     question: Question
     site: Site = field(init=False)
-    room: Room = field(init=False)
     weight: Floats = field(init=False)
 
     def __post_init__(self) -> None:
         problem = self.question.problem
-        self.site = site_of(problem.bench)
-        self.room = room_of(problem.bench, self.question.job)
+        self.site = site_of(problem.bench, self.question.job)
         self.weight = program_weight(problem)
 
     def judged(self, each: Candidate, *, whole: bool = False) -> Proposal | None:
@@ -60,12 +56,6 @@ class Desk:
             separates=separated(self.question.problem, self.question.rivals),
             told=found,
         )
-
-    def within(self, design: MotionDesign) -> bool:
-        """Whether the design is within reach of the machine and within `Site.farther` of the work."""
-        points = design.points()
-        near = np.abs(points - self.site.work.centre).max() <= self.site.farther + self.site.work.half.max()
-        return bool(near and self.room.allowed(points).all())
 
 
 def separated(problem: Problem, rivals: Sequence[Fitted]) -> tuple[str, ...]:
@@ -82,7 +72,7 @@ def propose(problem: Problem, rivals: Sequence[Fitted], probability: Floats, job
     desk = Desk(Question(problem, rivals, probability, job))
     if len(rivals) == 1 and most_narrowed(desk.question, desk.weight) <= WORTH:
         return None
-    found = ranked(desk, (*coarse(desk.site, desk.room), *by_other_means(desk.site)))
+    found = ranked(desk, (*coarse(desk.site), *by_other_means(desk.site)))
     bench = problem.bench
     can = (each for each in found if can_be_run(each.candidate, bench.runs, job, bench.twin))
     whole = [desk.judged(each.candidate, whole=True) for each in islice(can, MOST_JUDGED_WHOLE)]
@@ -94,7 +84,7 @@ def ranked(desk: Desk, tried: Iterable[Candidate]) -> list[Proposal]:
     """Candidates with a gain above proposal.WORTH, best first."""
     names = separated(desk.question.problem, desk.question.rivals)
     useful = (each for each in tried if all(effect in names for effect, *_ in each.knows))
-    judged = (desk.judged(each) for each in useful if desk.within(each.design))
+    judged = (desk.judged(each) for each in useful if desk.site.holds(each.design.points()))
     found = [each for each in judged if each is not None and each.gain > WORTH]
     return sorted(found, key=lambda each: -each.value)
 
@@ -111,8 +101,8 @@ def explore(problem: Problem, labels: Sequence[tuple[str, float]], job: Job) -> 
         weight[family] = max(weight.get(family, 0.0), share)
     whole = sum(weight.values())
     found = []
-    bench = problem.bench
-    for each in single_changes(site_of(bench), room_of(bench, job)):
+    bench, site = problem.bench, site_of(problem.bench, job)
+    for each in single_changes(site):
         p = sum(weight.get(family, 0.0) for family in each.varies) / whole if whole > 0 else 0.0
         gain = -float(sum(q * np.log2(q) for q in (p, 1.0 - p) if q > 0.0))
         if gain > WORTH:
@@ -121,4 +111,4 @@ def explore(problem: Problem, labels: Sequence[tuple[str, float]], job: Job) -> 
             found.append(Proposal(candidate=each, gain=gain, separates=("unknown",), outcomes=outcomes))
     found.sort(key=lambda each: -each.value)
     can = (each for each in found if can_be_run(each.candidate, bench.runs, job, bench.twin))
-    return next((each for each in can if feasible(problem, each.candidate, job)), None)
+    return next((each for each in can if site.holds(each.candidate.design.points())), None)

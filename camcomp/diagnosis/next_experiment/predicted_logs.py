@@ -9,6 +9,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
+from camcomp.diagnosis.experiment.driven_run import axes_along
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import build
 from camcomp.diagnosis.fit.measured import Measured
@@ -17,7 +18,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import LARGE
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.next_experiment.candidates import Candidate
-from camcomp.diagnosis.next_experiment.site import CHANNELS, STRETCH
+from camcomp.diagnosis.next_experiment.site import CHANNELS
 from camcomp.diagnosis.search.indistinguishable import HIDDEN
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
@@ -100,29 +101,9 @@ def predict_logs(question: Question, candidate: Candidate, *, whole: bool) -> Pr
         return None
 
 
-def feasible(problem: Problem, candidate: Candidate, job: Job) -> bool:
-    """Whether a candidate is feasible in the region where the model of the machine is valid."""
-    try:
-        _on_bench(problem, candidate, job)
-    except (CamcompError, ValueError):
-        return False
-    return True
-
-
-def _on_bench(problem: Problem, candidate: Candidate, job: Job) -> Bench:
-    run = _run(problem, candidate, job)
-    low, high = np.array(job.machine.limits).T
-    if (run.run_path.grid_rho < low).any() or (run.run_path.grid_rho > high).any():
-        raise ValueError("out of the travel of an actuator")
-    bench = Bench(twin=problem.bench.twin, runs=[run])
-    if bench.transmission > STRETCH * problem.bench.transmission:
-        raise ValueError("too near a singular pose for the model to be trusted")
-    return bench
-
-
 def _lay(question: Question, candidate: Candidate, whole: bool) -> PredictedLogs:
     problem, rivals = question.problem, question.rivals
-    bench = _on_bench(problem, candidate, question.job)
+    bench = Bench(twin=problem.bench.twin, runs=[_run(problem, candidate, question.job)])
     nominal = bench.channels(0, bench.nominal[0])
     changes = [bench.channels(0, bench.read(0, problem.causes(f.members, f.theta, f.extra))) - nominal for f in rivals]
     alone = _whitened(problem, bench, np.stack(changes, axis=2))
@@ -235,9 +216,7 @@ def _across(tips: Floats) -> Floats:
     moving = np.linalg.norm(step, axis=1) > 0.0
     last = np.maximum.accumulate(np.where(moving, np.arange(len(tips)), int(np.argmax(moving))))
     along = step[last] / np.maximum(np.linalg.norm(step[last], axis=1, keepdims=True), 1e-12)
-    side = np.cross(along, np.eye(3)[np.argmin(np.abs(along), axis=1)])
-    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
-    return np.stack([along, side, np.cross(along, side)], axis=1)
+    return axes_along(along)
 
 
 def _temperature(problem: Problem, common: Floats) -> Floats | None:

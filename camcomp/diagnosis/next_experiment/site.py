@@ -42,7 +42,7 @@ class Site:
     """Regions and channels of the runs.
 
     work: of all runs; cut: of cutting, or None. low: height above which there are no obstacles, mm; end: of the last run, s on
-    the common clock; channels: logged ones.
+    the common clock; channels: logged ones; room: what the machine reaches.
     """
 
     work: WorkPlace
@@ -50,15 +50,21 @@ class Site:
     low: float
     end: float
     channels: tuple[str, ...]
+    room: Room
 
     @property
     def farther(self) -> float:
         """Largest distance of an experiment from the centre of the work, mm."""
         return float(max(FARTHER_MM, FARTHER * self.work.half.max()))
 
+    def holds(self, points: Floats) -> bool:
+        """Whether points (n, 3) of an experiment are within reach of the machine and within `farther` of the work."""
+        near = np.abs(points - self.work.centre).max() <= self.farther + self.work.half.max()
+        return bool(near and self.room.allowed(points).all())
 
-def site_of(bench: Bench) -> Site:
-    """The site of the runs of a bench."""
+
+def site_of(bench: Bench, job: Job) -> Site:
+    """The site of the runs of a bench on the machine of a job."""
     each = [commanded(bench, run) for run in bench.runs]
     tips = np.concatenate(each)
     loaded = [np.abs(run.run_path.row_force).sum(axis=1) > 0.0 for run in bench.runs]
@@ -71,6 +77,7 @@ def site_of(bench: Bench) -> Site:
         _low(bench, each, loaded),
         max(run.run_path.started + float(run.run_path.time[-1]) for run in bench.runs),
         tuple(c for c in CHANNELS if any(run.measured.has(c) for run in bench.runs)),
+        Room(bench.twin, np.array(job.machine.limits, float), tips),
     )
 
 
@@ -147,9 +154,3 @@ class Room:
         rho = self.twin.inverse(self.twin.to_machine(moved)).reshape(3, 2, len(points), -1)
         slopes = np.moveaxis((rho[:, 0] - rho[:, 1]) / (2.0 * _DIFFERENCE_MM), 0, 2)  # (n, m, 3)
         return np.asarray(1.0 / np.maximum(np.linalg.svd(slopes, compute_uv=False)[:, -1], 1e-12), float)
-
-
-def room_of(bench: Bench, job: Job) -> Room:
-    """The reachable region around the runs of a bench."""
-    tips = np.concatenate([commanded(bench, run) for run in bench.runs])
-    return Room(bench.twin, np.array(job.machine.limits, float), tips)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.next_experiment.information_gain import ExpectedGain
-from camcomp.diagnosis.next_experiment.outcomes import NEITHER, ONLY_NOISE, with_outcomes
-from camcomp.diagnosis.next_experiment.proposal import Proposal
+from camcomp.diagnosis.next_experiment.proposal import NEITHER, ONLY_NOISE, Proposal, with_outcomes
 
 
 def outcomes(names, apart, left, *, knows=()):

@@ -200,7 +200,7 @@ def every_design(desk: Desk, steps: int) -> list[MotionDesign]:
 
 def allowed(desk: Desk, design: MotionDesign) -> bool:
     """Whether the machine can run it without a collision."""
-    return desk.within(design) and (design.cutting or design.points()[:, 2].min() >= desk.site.low - 0.05)
+    return desk.site.holds(design.points()) and (design.cutting or design.points()[:, 2].min() >= desk.site.low - 0.05)
 
 
 def world_of(question, seed: int = 61) -> World:
