@@ -37,7 +37,7 @@ class WorkPlace:
         return round(float(np.clip(np.min(self.half[:2]), *RADII_MM)), 1)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Site:
     """Regions and channels of the runs.
 
@@ -72,13 +72,11 @@ def site_of(bench: Bench, job: Job) -> Site:
     feeds = [run.run_path.feed_mm_per_min for run in bench.runs]
     cutting = [f for f, load in zip(feeds, loaded, strict=True) if load.any()]
     return Site(
-        _place(tips, feeds),
-        _place(tips[every], cutting) if every.any() else None,
-        _low(bench, each, loaded),
-        max(run.run_path.started + float(run.run_path.time[-1]) for run in bench.runs),
-        tuple(c for c in CHANNELS if any(run.measured.has(c) for run in bench.runs)),
-        Room(bench.twin, np.array(job.machine.limits, float), tips),
-    )
+        work=_place(tips, feeds), cut=_place(tips[every], cutting) if every.any() else None,
+        low=_low(bench, each, loaded), room=Room(bench.twin, np.array(job.machine.limits, float), tips),
+        end=max(run.run_path.started + float(run.run_path.time[-1]) for run in bench.runs),
+        channels=tuple(c for c in CHANNELS if any(run.measured.has(c) for run in bench.runs)),
+    )  # fmt: skip
 
 
 def _place(tips: Floats, feeds: list[float]) -> WorkPlace:
