@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -28,10 +28,10 @@ from camcomp.ground.files import display_name, read_bytes, write_all
 from camcomp.model.effect import Parameter
 from camcomp.model.law.covariates import load_of
 from camcomp.model.law.expression import FormulaError
-from camcomp.model.law.law import EmpiricalLaw
+from camcomp.model.law.law import AT_DRIVES, EmpiricalLaw
 from camcomp.model.law.spec import FormulaSpec, MapSpec
+from camcomp.model.signal_path import ORDER
 
-_HOOKS = {"control": "on_servo", "drive": "on_drive"}  # by stage; all others move the tip
 _SOURCE = "the law found before, 1: as large as there"
 
 
@@ -76,8 +76,10 @@ class LearnedLaw:
         effect = SimpleNamespace(
             TARGET="machine", SOURCE=_SOURCE, STAGE=self.law.on, PARAMETERS=self.parameters, __doc__=self.law.says
         )
-        for hook in dict.fromkeys(_HOOKS.get(law.on, "on_place") for law in laws):
-            setattr(effect, hook, partial(_in_turn, hook, placed))
+        formula = shelf.load("effects", "formula")
+        for stage in dict.fromkeys(law.on if law.on in AT_DRIVES else "workpiece" for law in laws):
+            for hook in (each for each in dict(ORDER)[stage] if hasattr(formula, each)):
+                setattr(effect, hook, partial(_in_turn, getattr(formula, hook), stage in AT_DRIVES, placed))
         return CandidateCause(self.name, None, effect)
 
     def entries(self, factors: Mapping[str, float]) -> list[dict[str, Any]]:
@@ -104,14 +106,15 @@ class _Piece:
     which: Floats
 
 
-def _in_turn(hook: str, pieces: Sequence[_Piece], values: Floats, *given: Any) -> Floats:
+def _in_turn(
+    hook: Callable[..., Floats], at_drives: bool, pieces: Sequence[_Piece], values: Floats, *given: Any
+) -> Floats:
     """Values of a hook of the effect `formula`, of the pieces one after the other, each as large as its factor."""
     *others, p = given
-    formula = getattr(shelf.load("effects", "formula"), hook)
     for each in pieces:
         if p[each.factor] != 0.0:
-            own = [others[0], each.which] if hook in _HOOKS.values() else others
-            values = formula(values, *own, {"law": replace(each.law, factor=p[each.factor] * each.law.factor)})
+            own = [others[0], each.which] if at_drives else others
+            values = hook(values, *own, {"law": replace(each.law, factor=p[each.factor] * each.law.factor)})
     return values
 
 
