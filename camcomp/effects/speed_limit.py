@@ -19,7 +19,9 @@ PLAIN = "a drive that goes no faster"
 REMEDY = "program a lower feed or rapid, raise the speed limit of the drive, or look for what brakes it"
 SOURCE = "rate limiter: |d(encoder)/dt| at most the speed, on the set-point where that allows it (Franklin et al., Feedback Control)"
 NO_LIMIT = 1e6
-LONGEST_DEAD_TIME_S = 0.3  # that is looked for
+_SHARES = np.linspace(0.3, 1.2, 24)  # of the fastest encoder, that are looked at as limits
+_DEAD_TIMES_S = np.linspace(0.0, 0.3, 11)
+GUESSED_FROM = len(_SHARES) * len(_DEAD_TIMES_S)
 _SHARE = Parameter("share", "1", 1.0, 0.0, 1.0, 1.0, 0.01, "of what the limit holds back: 1 by definition", sign=1)
 _SOURCE = "feed drives: 0.1 to 1 m/s; axes of arms: 0.2 to 10 rad/s"
 PARAMETERS = (
@@ -65,14 +67,12 @@ def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[st
     fastest = max((float(np.abs(np.diff(y) / np.maximum(np.diff(t), 1e-9)).max()) for t, _, y in runs), default=0.0)
     if fastest == 0.0:
         return {}
-    deads = np.linspace(0.0, LONGEST_DEAD_TIME_S, 11)
     first = min(
-        ((speed, dead) for speed in fastest * np.linspace(0.3, 1.2, 24) for dead in deads),
-        key=lambda at: _left(runs, *at),
+        ((speed, dead) for speed in fastest * _SHARES for dead in _DEAD_TIMES_S), key=lambda at: _left(runs, *at)
     )
     at = minimize(lambda x: _left(runs, *np.abs(x)), first, method="Nelder-Mead", options={"maxiter": 60}).x
     speed, dead = (abs(float(each)) for each in at)
-    if min(_left(runs, NO_LIMIT, each) for each in (*deads, dead)) <= _left(runs, speed, dead):
+    if min(_left(runs, NO_LIMIT, each) for each in (*_DEAD_TIMES_S, dead)) <= _left(runs, speed, dead):
         return {}
     return {"speed_rad_per_s" if hinge else "speed_mm_per_s": speed, "dead_time_ms": 1e3 * dead}
 

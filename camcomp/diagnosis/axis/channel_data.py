@@ -81,13 +81,16 @@ class ChannelData:
         )  # fmt: skip
 
 
-def healthy_sizes(columns: Sequence[Sizes], values: Sequence[Floats], floor: float) -> tuple[dict[str, Floats], Floats]:
+def healthy_sizes(
+    columns: Sequence[Sizes], values: Sequence[Floats], floor: float, noise: Sequence[Floats]
+) -> tuple[dict[str, Floats], Floats]:
     """Sizes by kind that every axis has in values (n,) per run, under their prior, with their covariance.
 
-    floor: least noise of a row. The prior is that of `fit_channel`.
+    floor: least noise of a row; noise (n,) per run, in floors. The prior is that of `fit_channel`.
     """
-    X = np.concatenate([np.concatenate([*own.values()], axis=1) for own in columns])
-    y = np.concatenate([*values])
+    by = np.concatenate([*noise])
+    X = np.concatenate([np.concatenate([*own.values()], axis=1) for own in columns]) / by[:, None]
+    y = np.concatenate([*values]) / by
     rms = np.sqrt(np.mean(X**2, axis=0))
     scale = np.where(rms > 0.0, rms, 1.0)  # columns of zeros keep their prior
     X = X / scale

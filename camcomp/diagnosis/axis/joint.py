@@ -42,7 +42,9 @@ CREEP = 0.02  # of the fastest row: speed at which Coulomb friction has turned r
 class JointRows:
     """Rows of one channel of an axis: runs as logged, how the axis moved in the rows that count, and their values.
 
-    numbers: of the runs in their experiment. whole: times and values of every row, where these are more. asymmetric: whether friction in its drive force differs between the directions, which deflects its loop.
+    numbers: of the runs in their experiment. whole: times and values of every row, where these are more. asymmetric: whether
+    friction in its drive force differs between the directions, which deflects its loop. noise (n,) per run: of rows, in
+    floors; 1 where it is not given.
     """
 
     channel: ChannelName
@@ -56,6 +58,7 @@ class JointRows:
     stated: bool
     whole: Sequence[tuple[Floats, Floats]] = ()
     asymmetric: bool = False
+    noise: Sequence[Floats] = ()
 
 
 def study_channel(
@@ -77,7 +80,7 @@ def study_channel(
 
     data = ChannelData(
         values=rows.values, healthy=_healthy(found, rows, around, seen, axes), covariates=_covariates(found, rows, around),
-        response=response, floor=rows.floor, train=rows.train, times=[m.time for m in rows.moves],
+        response=response, floor=rows.floor, train=rows.train, times=[m.time for m in rows.moves], noise=rows.noise,
         clock=WITHIN * _step(rows.moves) if rows.channel == "force" else 0.0,
         level=0.0 if following else float(np.mean(np.concatenate([rows.values[k] for k in rows.train]))),
     )  # fmt: skip
@@ -159,7 +162,12 @@ def _by_kind(texts: Mapping[str, Sequence[str]], columns: Floats) -> dict[str, F
 def _behind_causes(data: ChannelData, done: ChannelFit, columns: Sequence[Mapping[str, Floats]]) -> ChannelFit:
     """The fit of a following error with the residual of its written laws and causes. columns (n, q): of the laws by kind, per run."""
     rest = [values - data.response(k, done.acting) for k, values in enumerate(data.values)]
-    sizes, covariance = healthy_sizes([columns[k] for k in data.train], [rest[k] for k in data.train], data.floor)
+    own, values, noise = (
+        [columns[k] for k in data.train],
+        [rest[k] for k in data.train],
+        [data.noise[k] for k in data.train],
+    )
+    sizes, covariance = healthy_sizes(own, values, data.floor, noise)
     left = [own - sum(columns[k][kind] @ size for kind, size in sizes.items()) for k, own in enumerate(rest)]
     return replace(done, sizes=sizes, covariance=covariance, left=left)
 
@@ -340,6 +348,7 @@ def _channel(rows: JointRows, done: ChannelFit, response: Response) -> AxisChann
     constant = done.sizes["offset"][0] if rows.channel == "force" else 0.0
     pushing = [each for each in done.acting if each[0].run is not None]
     pushed = [response(k, pushing) for k in range(len(values))]
+    spread = float(np.sqrt(np.mean(np.concatenate([*rows.noise]) ** 2))) if rows.noise else 1.0
     channel = AxisChannel(
         runs=[
             ChannelRun(
@@ -349,7 +358,7 @@ def _channel(rows: JointRows, done: ChannelFit, response: Response) -> AxisChann
             )
             for k in (*rows.train, *rows.test)
         ],
-        floor=rows.floor, stated=rows.stated, columns=done.columns,
+        floor=rows.floor * spread, stated=rows.stated, columns=done.columns,
     )  # fmt: skip
     order = [*rows.train, *rows.test]
     left = [done.left[k] for k in order]
@@ -358,5 +367,7 @@ def _channel(rows: JointRows, done: ChannelFit, response: Response) -> AxisChann
         own = [not_known(values[k] - done.left[k] - constant) for k in order]
         known = [np.hypot(each, rising(pushed[k], moves[k].time, rise)) for k, each in zip(order, own, strict=True)]
         left = [each / np.hypot(1.0, by / rows.floor) for each, by in zip(left, known, strict=True)]
+    if rows.noise:
+        left = [each / rows.noise[k] for k, each in zip(order, left, strict=True)]
     channel.gate = judge(left, [moves[k].time for k in order], rows.floor)
     return channel

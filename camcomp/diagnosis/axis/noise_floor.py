@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import median_abs_deviation
+from scipy.signal import lfilter
+from scipy.stats import median_abs_deviation, norm
 
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM, resolution_of, rounding_noise
 from camcomp.ground.datatypes import Floats
@@ -14,6 +15,7 @@ SPIKE = 12.0  # deviations from the neighbours' median
 FAST_S = 0.005  # between rows: within two of them no drive goes out and comes back, however little
 LEAST_SPIKE_MM = 0.1  # the same between rows that are further apart: none goes so far
 MOST_SPIKES = 0.03  # of the rows; more are no mistakes
+QUIET = 0.1  # of the rows, which even busy moves leave without a corner
 NEIGHBOURS = 3  # rows on either side, so that two that follow each other do not hide each other
 
 
@@ -60,3 +62,21 @@ def following_floor(pairs: Sequence[tuple[Floats, Floats]]) -> float:
     apart = np.hypot(rows_floor(moved), rows_floor(asked))
     own = rows_floor([x - y for x, y in pairs])
     return float(np.hypot(max(own, float(apart)), REPEATABILITY_MM))
+
+
+def between_rows(time: Floats, setpoint: Floats, late_s: float) -> Floats:
+    """What a following error (n,) mm is not known to, because nobody logged how set-points went between two rows.
+
+    A loop of first order that follows `late_s` behind remembers, dt later, e^-x (x = dt / late_s) of how far its set-points
+    were off the straight line between rows. A constant acceleration a is off by a s (dt - s) / 2 within a row, of which the loop
+    makes a late_s^2 (x - 2 + (x + 2) e^-x) / 2. The column of accelerations takes its mean; its change from row to row is left,
+    as far as the set-points' own scatter does not show the same.
+    """
+    if late_s <= 0.0 or len(time) < 5:
+        return np.zeros(len(time))
+    x = float(np.median(np.diff(time))) / late_s
+    share = (x - 2.0 + (x + 2.0) * np.exp(-x)) / (2.0 * x**2)
+    quiet = float(np.quantile(np.abs(np.diff(setpoint, 4)), QUIET)) / float(norm.isf(0.5 - 0.5 * QUIET)) / np.sqrt(70.0)
+    change = np.maximum(np.abs(np.diff(setpoint, 3)) - 3.0 * np.sqrt(20.0) * quiet, 0.0)
+    rows = np.maximum(np.pad(change, (1, 2), "edge"), np.pad(change, (2, 1), "edge"))  # on either side of a row
+    return np.asarray(lfilter([share], [1.0, -np.exp(-x)], rows))

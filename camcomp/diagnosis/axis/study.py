@@ -22,10 +22,9 @@ from camcomp.diagnosis.axis.joint import JointRows, study_channel
 from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
 from camcomp.diagnosis.axis.next_moves import next_moves
-from camcomp.diagnosis.axis.noise_floor import following_floor, rows_floor
+from camcomp.diagnosis.axis.noise_floor import between_rows, following_floor, rows_floor
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
-from camcomp.diagnosis.law.folds import PARTS
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.diagnosis.model.verdict import VerdictInputs, Word, decide
@@ -60,7 +59,7 @@ def studied(
     axis has enough rows.
     """
     names = sorted({r.name for runs in axes.values() for r in runs})
-    held = [n for n in names if n in holdout] if holdout else names if len(names) >= PARTS else []
+    held = [n for n in names if n in holdout] if holdout else names if len(names) > 1 else []
     again = 0 if len(held) == 1 and holdout else len(held)  # fits that leave out one run each
     clean = {name: [r.without_spikes() for r in runs] for name, runs in axes.items()}
     outliers = {(r.name, int(row)) for runs in clean.values() for r, rows in runs for row in rows}
@@ -104,9 +103,8 @@ def _result(
         axis_laws=tuple(law for a in found for law in a.laws),
         axes_in_detail={a.name: a.details for a in found}, standards=StandardValues(absent=(NO_TIPS,)),
     )  # fmt: skip
-    positions = [c for a in found if a.strange for c in (a.following, a.behind) if c is not None]
-    in_forces = all(c.gate is None or c.gate.word == "at" for c in positions)
-    return within_floor(result, in_forces=in_forces)
+    forces = [a.force for a in found if a.strange and a.force is not None]
+    return within_floor(result, in_forces=any(c.gate is not None and c.gate.word == "above" for c in forces))
 
 
 def _every_axis(
@@ -225,9 +223,12 @@ def _followed(
     runs, moves, values = motion_of(found, every, gaps, train, late)
     stated = found.stated.encoder_mm
     floor = stated or following_floor([(runs[k].setpoint, runs[k].encoder) for k in train])
+    unseen = [
+        between_rows(r.time, r.setpoint, late)[np.isin(r.time, m.time)] for r, m in zip(every, moves, strict=True)
+    ]
     rows = task.rows(
         moves, values, channel="following", floor=floor, stated=stated is not None, asymmetric=asymmetric, runs=every,
-        whole=[(r.time, r.gap) for r in task.usable],
+        whole=[(r.time, r.gap) for r in task.usable], noise=[np.hypot(1.0, own / floor) for own in unseen],
     )  # fmt: skip
     found, found.following = study_channel(found, rows, task.around, task.without)
     return found, late

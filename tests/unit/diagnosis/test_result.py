@@ -73,7 +73,8 @@ def test_a_study_of_axes_with_unseen_runs_tells_how_far_the_gap_shrinks():
     runs = [axis_run(name, seed=k) for k, name in enumerate("abcd")]
     assert axis_study({"x": runs}).shrinkage.holdout == ("a", "b", "c", "d")
     assert axis_study({"x": runs[:2]}, holdout=["b"]).shrinkage.holdout == ("b",)
-    assert axis_study({"x": runs[:2]}).shrinkage is None
+    assert axis_study({"x": runs[:2]}).shrinkage.holdout == ("a", "b")
+    assert axis_study({"x": runs[:1]}).shrinkage is None
 
 
 @pytest.mark.parametrize("verdict", ["none", "identified", "ambiguous", "unknown"])

@@ -132,3 +132,9 @@ def test_it_is_found_by_set_points_and_encoders(tmp_path):
     assert values["period_ms"] == pytest.approx(50.0, rel=0.05)
     assert values["damping"] == pytest.approx(damping, rel=0.05)
     assert values["time_constant_ms"] == pytest.approx(2e3 * damping / w, rel=0.05)
+
+
+def test_an_effect_that_guesses_its_shape_says_among_how_many():
+    """The best of so many is prior evidence for none of them: one of the others would have fitted as well by chance."""
+    guessing = [module for _, module in shelf.usable("effects") if hasattr(module, "guess")]
+    assert len(guessing) > 1 and all(module.GUESSED_FROM > 50 for module in guessing)
