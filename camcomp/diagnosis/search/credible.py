@@ -137,8 +137,12 @@ def _weights(problem: Problem) -> list[list[float]]:
 
     An encoder resolves a hundredth of it, and every model is wrong by more.
     """
-    noise_um = 1e3 * problem.noise.sigma * problem.bench.tip_sizes
-    kinds = [noise_um[:, problem.channels_of(words.kind)] for words in problem.dictionaries]
-    size = [np.nanmedian(np.where(each > 0.0, each, np.nan), axis=1) for each in kinds]
-    least = np.minimum(np.nan_to_num(size, nan=np.inf) / (MINOR * problem.floor.tip_um), 1.0)
-    return [each.tolist() for each in least.T]
+    noise_um, most = 1e3 * problem.noise.sigma * problem.bench.tip_sizes, MINOR * problem.floor.tip_um
+    kinds = [problem.channels_of(words.kind) for words in problem.dictionaries]
+    return [[min(1.0, _middle(own[kind]) / most) for kind in kinds] for own in noise_um]
+
+
+def _middle(values: Floats) -> float:
+    """Median of the values (n,) above 0; infinite without any."""
+    seen = values[values > 0.0]
+    return float(np.median(seen)) if len(seen) else np.inf

@@ -78,3 +78,16 @@ def test_a_shift_for_a_while_where_a_run_jumps_from_row_to_row_is_some_of_the_ju
     walk = np.cumsum(np.random.default_rng(3).normal(0.0, 0.5, ROWS))[np.argsort(np.argsort(TIME))]
     sure, replaced = present(monkeypatch, shift(0.15, 0.27), walk - walk.mean() + noise(6))
     assert sure < 0.5 and replaced > 0.5
+
+
+def test_no_row_counts_for_more_than_what_is_minor_at_the_tip_and_runs_may_lack_a_channel():
+    encoder_mm = np.array([np.nan, 1e-4])
+    problem = SimpleNamespace(
+        noise=SimpleNamespace(sigma=np.column_stack([np.full((2, 3), 0.01), encoder_mm])),
+        bench=SimpleNamespace(tip_sizes=np.ones((2, 4))), floor=SimpleNamespace(tip_um=5.0),
+        channels_of={"tip": slice(0, 3), "encoder": slice(3, 4)}.__getitem__,
+        dictionaries=[SimpleNamespace(kind="tip"), SimpleNamespace(kind="encoder")],
+    )  # fmt: skip
+    weights = credible._weights(problem)
+    assert weights[0] == [1.0, 1.0]
+    assert weights[1] == pytest.approx([1.0, 0.1 / (0.3 * 5.0)])
