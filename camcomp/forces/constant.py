@@ -12,6 +12,8 @@ SOURCES = (
     "manipulators composed of non-perfect kinematic chains, Advances in Robot Kinematics 2012: 215, -10, -25 N."
 )
 
+STEADY = True  # the force depends on the cut alone, not on the way to it
+
 
 class Params(Spec):
     """Force on the tool in the path frame."""

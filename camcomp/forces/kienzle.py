@@ -20,6 +20,8 @@ SOURCES = (
 
 RAKE_LOSS_PER_DEG = 0.01
 
+STEADY = True  # the force depends on the cut alone, not on the way to it
+
 
 class Params(Spec):
     """Specific cutting force of the material, and ratios of the force components."""

@@ -17,6 +17,8 @@ SOURCES = (
     "2 to 4 times the mean."
 )
 
+STEADY = True  # the force depends on the cut alone, not on the way to it
+
 
 class Params(Spec):
     """Cutting coefficients (force per chip area) and edge coefficients (force per length of edge)."""

@@ -8,6 +8,8 @@ from camcomp.model.cutting.cut import Cut
 
 SOURCES = "A definition: no force."
 
+STEADY = True  # the force depends on the cut alone, not on the way to it
+
 
 class Params(Spec):
     """No keys."""

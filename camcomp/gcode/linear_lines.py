@@ -65,13 +65,12 @@ def scan(*args: Any) -> tuple[Any, ...]:
 
 
 @entry
-def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, position, unit, offset, pointed, top, out, limit,
+def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, position, unit, offset, pointed, out, limit,
                begin, finish, value):  # fmt: skip
     """Reads linear moves from index `at` of the bytes `data` (up to `stop`) into `out`, at most `limit` motions.
 
     last: the file ends at `stop`. code: 0, 1 or -1 (none of them in force), feed in force (0: none), position (3,) mm,
-    unit mm, offset (3,) mm. pointed: numbers without a point are left to the interpreter. top: so is a cut from one side of
-    this height to the other, mm; NaN: there is none. Returns (motions, rows, index, reason, code, feed,
+    unit mm, offset (3,) mm. pointed: numbers without a point are left to the interpreter. Returns (motions, rows, index, reason, code, feed,
     code_stated, feed_stated); `position` is moved along. begin, finish, value (5,): room to work in.
     """
     n = 0
@@ -190,9 +189,6 @@ def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, posit
             for k in range(3):
                 if begin[k] >= 0 and abs(value[k] * unit) > _LARGEST_WORD:
                     return n, row, at, NOT_LINEAR, code, feed, code_stated, feed_stated
-            height = value[Z] * unit + offset[Z] if begin[Z] >= 0 else position[Z]
-            if now == 1 and (position[Z] < top) != (height < top):
-                return n, row, at, NOT_LINEAR, code, feed, code_stated, feed_stated
             for k in range(3):
                 out.start[n, k] = position[k]
                 if begin[k] >= 0:

@@ -63,7 +63,7 @@ class LinearReader:
         n, rows, _, _, code, feed, coded, fed = scan(
             self._data, int(self._starts[row]), self._stop, self._last, motion_number(state), state.feed or 0.0,
             record.code_stated, record.feed_stated, position, state.unit, np.array(state.offset), self._increments,
-            np.nan, self._room, len(self._room.row),
+            self._room, len(self._room.row),
         )  # fmt: skip
         if rows < MIN_RUN or not n:
             self._pause = min(2 * self._pause + 1, MAX_PAUSE)

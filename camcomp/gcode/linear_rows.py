@@ -101,20 +101,18 @@ def write_rows(*args: Any) -> int:
 
 @entry
 def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed, code_stated, feed_stated, program_feed,
-                first, joining, rest, begins, at_rest, on, commanded, feed, position, state, unit, offset, digits, half, feed_point, out, written, held, value, goes, fresh):  # fmt: skip
+                first, joining, commanded, feed, position, state, unit, offset, digits, half, feed_point, out, written, held, value, goes, fresh):  # fmt: skip
     """The bytes text_at..text_end of `data`, which hold n motions, with N rows in their place.
 
     lines (n, 3), begin and finish (n, 5), kind (n,), programmed (n, 3) mm, program_feed (n,): see
     linear_lines.LinearMotions.
-    first (n + 1,): rows of every motion. joining (N,), rest (N,): ends at rest; at_rest, on: bytes of the
-    lines in front of such rows and of the next that is none (begins -1: of the first in any case, else 0), commanded (N, 3) mm, feed (N,) mm/min (NaN: as programmed).
+    first (n + 1,): rows of every motion. joining (N,), commanded (N, 3) mm, feed (N,) mm/min (NaN: as programmed).
     position (3,) mm and state (2,) = motion code in force (-1 unknown), feed in force (NaN unknown):
     carried on. feed_point: whole feeds have a point. Fills out (bytes), written (N, 3) mm, held (N,): feed in force
     behind the row, mm/min. Returns the number of bytes. value, goes, fresh (3,): room to work in.
     """
     at = 0
     copied = text_at
-    resting = begins
     for i in range(lines.shape[0]):
         # the words of the line, and how its letters stand
         first_word = -1
@@ -164,13 +162,6 @@ def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed,
             if row > main:
                 at = copy(out, at, data, copied, behind)
                 copied = behind
-                at = put_eol(out, at, data, eol_begin, eol_end)
-            if rest[row] != resting:
-                resting = int(rest[row])
-                mode = at_rest if resting else on
-                for each in mode:
-                    out[at] = each + 32 if lower and 65 <= each <= 90 else each
-                    at += 1
                 at = put_eol(out, at, data, eol_begin, eol_end)
             if new:
                 if not (fresh[0] or fresh[1] or fresh[2]):

@@ -10,13 +10,14 @@ import numpy as np
 from camcomp.gcode.linear_rows import MAX_ROW_BYTES, write_rows
 from camcomp.gcode.numbers import FEED_DIGITS
 from camcomp.gcode.output import Output
+from camcomp.gcode.path_mode import numbered
 from camcomp.gcode.program import LETTERS, LINEAR_LETTERS, Program
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 
 TIE = 1e-6  # of the last digit: nearer to a tie than this, two ways of rounding may differ
+_TENS = 10.0 ** np.arange(18)
 _LINEAR = [LETTERS.index(each) for each in LINEAR_LETTERS]
 _OTHER = [k for k in range(len(LETTERS)) if k not in _LINEAR]
-_NO_MODE = np.zeros(0, np.uint8)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,8 +50,7 @@ class LinearWriter:
             return out
         linear = self._linear()
         assert self.out.rest is not None and self.out.apart is not None
-        modes = np.array([id(each) for each in self.program.modes])
-        keys = (sites.unit, *sites.offset.T, modes, self.out.rest[rows], self.out.apart[rows])
+        keys = (sites.unit, *sites.offset.T, numbered(self.program.modes)[1], self.out.rest[rows], self.out.apart[rows])
         fresh = ~linear
         fresh[1:] |= ~linear[:-1]
         for each in keys:
@@ -98,8 +98,11 @@ class LinearWriter:
             scaled[at] = (self.out.end[at] - sites.offset[motion[at]]) / unit * 10.0**digits
         feed = np.where(np.isnan(self.out.feed), self.program.path.feed[motion], self.out.feed)
         feed = np.where(feed > 0.0, feed / sites.unit[motion], 1.0)
-        feed *= 10.0 ** np.maximum(FEED_DIGITS - 1 - np.floor(np.log10(feed)), 0.0)
-        return np.asarray((np.abs(np.column_stack((scaled, feed)) % 1.0 - 0.5) < TIE).any(axis=1))
+        feed *= _TENS[np.maximum(FEED_DIGITS - 1 - np.floor(np.log10(feed)), 0.0).astype(np.int64)]
+        tied = np.zeros(len(feed), np.bool_)
+        for each in (*scaled.T, feed):
+            tied |= np.abs(each - np.floor(each) - 0.5) < TIE
+        return tied
 
     @cached_property
     def _data(self) -> np.ndarray:
@@ -122,12 +125,11 @@ class LinearWriter:
         ends, held = np.empty((count, 3)), np.empty(count)
         place = np.array(position, float)
         state = np.array([-1.0 if code is None else float(code), np.nan if feed is None else feed])
-        still = np.zeros(count, np.bool_)
         size = write_rows(
             self._data, begin, end, lines, sites.begin[a:b][:, _LINEAR].copy(), sites.finish[a:b][:, _LINEAR].copy(),
             path.kind[a:b].copy(), np.ascontiguousarray(path.end[a:b]), sites.code_stated[a:b].copy(), sites.feed_stated[a:b].copy(),
-            sites.modal_feed[a:b].copy(), self.bounds[a : b + 1] - self.bounds[a], self.out.joining[own].copy(), still, 0,
-            _NO_MODE, _NO_MODE, self.out.end[own].copy(), self.out.feed[own].copy(), place, state, unit, sites.offset[a].copy(),
+            sites.modal_feed[a:b].copy(), self.bounds[a : b + 1] - self.bounds[a], self.out.joining[own].copy(),
+            self.out.end[own].copy(), self.out.feed[own].copy(), place, state, unit, sites.offset[a].copy(),
             program.language.digits(self.resolution, unit), half, program.feed_point, out, ends, held,
         )  # fmt: skip
         feeds = np.where(self.out.kind[own] == RAPID, np.nan, held)

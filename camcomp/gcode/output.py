@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.gcode.path_mode import PathMode
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path, frozen
 
 FEED_SLACK = 1.0e-3  # relative difference of a feed below which no F word is written
@@ -100,6 +101,8 @@ class Standing:
     position: tuple[float, float, float]  # mm, program frame
     code: int | None = None
     feed: tuple[int, float] | None = None
+    stated: PathMode | None = None  # path mode that the program stated last; None: that of its setup
+    ours: str = ""  # path mode written by the writer of corrected programs and in force; empty: the program's
 
 
 @dataclass(frozen=True)

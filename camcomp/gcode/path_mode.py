@@ -1,10 +1,14 @@
 """Path modes G60, G61, G61.1, G64, G641: exact stop at the ends of moves, or tolerance of blended corners."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from camcomp.gcode.codes import EXACT_STOPS, code_name
+from camcomp.ground.datatypes import Ints
 
 NUMBER = r"\d+(?:\.\d*)?|\.\d+"
 ROUNDING_DISTANCE = 6410  # Sinumerik: corners are blended from ADIS mm before them on
@@ -40,6 +44,15 @@ class PathMode:
         words = [f"P{self.tolerance_mm / unit:g}"] if self.tolerance_mm or self.merge_mm else []
         words += [f"Q{self.merge_mm / unit:g}"] if self.merge_mm != self.tolerance_mm else []
         return " ".join([name, *words])
+
+
+def numbered(modes: Sequence[PathMode]) -> tuple[list[PathMode], Ints]:
+    """The modes of statements that differ, and which one is that of each motion (n,)."""
+    if not modes or modes.count(modes[0]) == len(modes):
+        return list(modes[:1]), np.zeros(len(modes), np.int64)
+    ids = np.fromiter(map(id, modes), np.int64, len(modes))
+    _, first, which = np.unique(ids, return_index=True, return_inverse=True)
+    return [modes[k] for k in first], which
 
 
 def path_mode(code: int, tolerance: float | None, merge: float | None) -> PathMode:

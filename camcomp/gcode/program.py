@@ -1,6 +1,6 @@
 """Result of reading a program: its path, and the positions of its numbers in the text."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,10 @@ class Sites:
     modes_changed: Bools  # (n,) the line changes a mode on which the meaning of its words depends
     stops: Bools  # (n,) the line stops the program after its motion (M0, M2, ...)
     fixed: Bools  # (n,) the line has several motions or no G0..G3: not to be rewritten in place
+
+    def take(self, rows: Ints) -> "Sites":
+        """Those of some of the motions."""
+        return Sites(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
 
 
 @dataclass(frozen=True)

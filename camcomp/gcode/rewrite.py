@@ -114,12 +114,13 @@ class Writer(LineEditor):
         if bounds[part.first]:
             self.ends[bounds[part.first] - 1] = part.before.position
         self.position, self.code, self.feed = [*part.before.position], part.before.code, part.before.feed
+        self.stated, self.ours = part.before.stated or self.stated, part.before.ours
         self._find_runs(bounds)
         k = part.first
         while k < part.last:
             k = self._advance(k, part.last, bounds)
         x, y, z = map(float, self.position)
-        return Standing((x, y, z), self.code, self.feed)
+        return Standing((x, y, z), self.code, self.feed, self.stated, self.ours)
 
     # --- runs of linear motions ---------------------------------------------------------------------------------
 

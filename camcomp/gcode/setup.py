@@ -33,10 +33,6 @@ class Setup:
     rotation: tuple[Triple, Triple, Triple] | None = None  # program axes in machine axes; None: parallel
     frames: Callable[[], RobotFrames] | None = None  # of the arm, for programs in its own language
 
-    def __deepcopy__(self, memory: object) -> Setup:
-        """Return the same object: nothing in it changes."""
-        return self
-
     def in_machine_axes(self, vector: Sequence[float]) -> list[float]:
         """A vector (3,) of program axes in machine axes."""
         if self.rotation is None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from copy import copy
 
 from camcomp.gcode.codes import OFFSET_NAMES, WORK_OFFSETS
 from camcomp.gcode.dialect import Dialect
@@ -66,6 +67,16 @@ class ControlState:
         self.dwelt_s = 0.0  # G4 so far
         self.tool_changes = 0  # M6 so far
         self.update()
+
+    def copy(self) -> "ControlState":
+        """The state at this moment; what does not change is shared."""
+        out = copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, dict):
+                setattr(out, name, dict(value))
+            elif isinstance(value, list):
+                setattr(out, name, [list(each) if isinstance(each, list) else each for each in value])
+        return out
 
     @property
     def sense(self) -> float:

@@ -4,9 +4,39 @@ Arcs turn uniformly with u; where the end lies on another radius than the start 
 do within their radius tolerance), and a helix climbs linearly.
 """
 
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
+# numba infers the types of the compiled functions.
+
+import math
+
 import numpy as np
 
+from camcomp.ground.compiled import entry
 from camcomp.ground.datatypes import ARC, Floats, Ints, Path
+from camcomp.ground.vectors import sizes
+
+
+@entry
+def between_ends(start, end, motion, u, out):
+    """Fills out (k, 3) with points of lines (n, 3) at fractions u (k,) of lines (k,); at 0 and 1 exactly their ends."""
+    for i in range(motion.shape[0]):
+        k, w = motion[i], u[i]
+        for j in range(3):
+            a, b = start[k, j], end[k, j]
+            out[i, j] = a if w == 0.0 else b if w == 1.0 else a + w * (b - a)
+
+
+@entry
+def directions(start, end, motion, out):
+    """Fills out (k, 3) with the unit directions of lines (k,) from start to end (n, 3); zero for lines without length."""
+    for i in range(motion.shape[0]):
+        k = motion[i]
+        x, y, z = end[k, 0] - start[k, 0], end[k, 1] - start[k, 1], end[k, 2] - start[k, 2]
+        size = math.sqrt(x * x + y * y + z * z)
+        if size > 0.0:
+            out[i, 0], out[i, 1], out[i, 2] = x / size, y / size, z / size
+        else:
+            out[i, 0] = out[i, 1] = out[i, 2] = 0.0
 
 
 def turn(vectors: Floats, axis: Floats, angle: Floats) -> Floats:
@@ -25,16 +55,16 @@ def _arc(path: Path, motion: Ints) -> tuple[Floats, Floats, Floats, Floats, Floa
     climb = np.sum(last * axis, axis=1)
     last = last - climb[:, None] * axis
     first = first - np.sum(first * axis, axis=1)[:, None] * axis
-    radius = np.maximum(np.linalg.norm(first, axis=1), 1e-300)
-    return first, climb, np.linalg.norm(last, axis=1) / radius - 1.0, axis, angle
+    radius = np.maximum(sizes(first), 1e-300)
+    return first, climb, sizes(last) / radius - 1.0, axis, angle
 
 
 def points(path: Path, motion: Ints, u: Floats) -> Floats:
     """Programmed tip (k, 3) mm at fraction u (k,) of motion (k,). Ends are exactly the programmed ones."""
-    start, end = path.start[motion], path.end[motion]
-    out: Floats = start + u[:, None] * (end - start)
-    arc = path.kind[motion] == ARC
-    if arc.any():
+    out = np.empty((len(motion), 3))
+    between_ends(path.start, path.end, motion, u, out)
+    arc = path.kind[motion] == ARC if (path.kind == ARC).any() else None
+    if arc is not None and arc.any():
         which, at = motion[arc], u[arc]
         first, climb, growth, axis, angle = _arc(path, which)
         out[arc] = (
@@ -42,13 +72,17 @@ def points(path: Path, motion: Ints, u: Floats) -> Floats:
             + turn(first, axis, at * angle) * (1.0 + growth * at)[:, None]
             + (climb * at)[:, None] * axis
         )
-    last, first = u == 1.0, u == 0.0
-    out[last], out[first] = end[last], start[first]
+        last, first = u == 1.0, u == 0.0
+        out[last], out[first] = path.end[motion[last]], path.start[motion[first]]
     return out
 
 
 def tangents(path: Path, motion: Ints, u: Floats) -> Floats:
     """Unit direction of travel (k, 3); zero where the motion has no length."""
+    if not (path.kind == ARC).any():
+        found = np.empty((len(motion), 3))
+        directions(path.start, path.end, motion, found)
+        return found
     out = path.end[motion] - path.start[motion]
     arc = path.kind[motion] == ARC
     if arc.any():
@@ -61,17 +95,16 @@ def tangents(path: Path, motion: Ints, u: Floats) -> Floats:
             + climb[:, None] * axis
         )
     size = np.linalg.norm(out, axis=1, keepdims=True)
-    found: Floats = np.divide(out, size, out=np.zeros_like(out), where=size > 0.0)
-    return found
+    return np.asarray(np.divide(out, size, out=np.zeros_like(out), where=size > 0.0))
 
 
 def lengths(path: Path) -> Floats:
     """Length (n,) mm of every motion (of a spiral to second order in its change of radius)."""
-    out = np.linalg.norm(path.end - path.start, axis=1)
+    out = sizes(path.end - path.start)
     arc = np.flatnonzero(path.kind == ARC)
     if len(arc):
         first, climb, growth, _, angle = _arc(path, arc)
-        radius = np.linalg.norm(first, axis=1)
+        radius = sizes(first)
         around = radius * (1.0 + 0.5 * growth) * np.abs(angle)
         out[arc] = np.sqrt(around**2 + climb**2 + (radius * growth) ** 2)
     found: Floats = out

@@ -159,6 +159,7 @@ class Job:
         return Conditions(
             model=None if none else partial(_forces, member.force, choice.params, c),
             plunges=bool(getattr(member, "PLUNGES", False)),
+            steady=bool(getattr(member, "STEADY", False)),
             tool_axis=self.tool_axis,
             stock_top_mm=c.workpiece.stock_top_mm,
             depth_mm=c.process.depth_mm,

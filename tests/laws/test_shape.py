@@ -16,7 +16,7 @@ BY_POSITION = {"Parameter", "at", "exactly_one", "table"}
 BEFORE_KERNELS = {"look_up", "scan", "write_rows"}  # pass the arrays of a kernel on, in its order
 # Compiled kernels over 60 lines: numba compiles a split kernel in more time.
 LONG_KERNELS = {
-    "corners", "cut_legs", "lay_engaged", "machine_step", "rounded", "scan_lines", "solve_one", "write_lines",
+    "corners", "cut_legs", "machine_step", "rounded", "scan_lines", "solve_one", "write_lines",
 }  # fmt: skip
 # Places that are still open, by folder: long functions, functions with many parameters, calls with many positional
 # arguments, dataclasses with more than five fields that are not keyword-only. A number may only be lowered.

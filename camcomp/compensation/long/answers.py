@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
-from camcomp.compensation.long.field import Field
-from camcomp.compensation.long.proof import judge
+from camcomp.compensation.long.field import Field, Tiles
+from camcomp.compensation.long.kernel import BASIC, follow, same_points
+from camcomp.compensation.long.proof import CHECKED_SHARE, MOST_CHECKED, judge
 from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.compensation.program.compensate import Compensated, compensate
 from camcomp.compensation.program.result import Interpolation
 from camcomp.gcode.program import Program
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.job import Job
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.solve import FREE, TARGET, State, inverse, solve
-from camcomp.model.statics.target import correct, settle
+from camcomp.model.statics.target import Correction, correct, settle
 
 MOST_STEPS, STEP_MM = 20, 1e-6  # the slopes of a cube are those of its centre: every step leaves a tenth
 LEAST_MOTIONS = 2000  # from which new cubes pay
-SAMPLE = 1000  # points that are solved exactly, at most
+COARSE_MM = 1e-3  # from a command: farther ones are not taken for its first order
 
 
 class InterpolatedMachine:
@@ -32,6 +33,8 @@ class InterpolatedMachine:
         self.machine, self._middle = machine, middle
         self._field: Field | None = None
         self._exact = 0
+        self._aimed: tuple[Floats, Floats, Floats, Floats, Ints] | None = None  # the latest targets, forces and answers
+        self._tiles: Tiles | None = None  # from which
         self._nominal: tuple[Floats, Floats, Ints] | None = None  # the latest tips, their set-points and tiles
 
     def solve(self, mode: int, near: Floats, force: Floats, rho: Floats | None, *, tips_only: bool = False) -> State:
@@ -41,7 +44,10 @@ class InterpolatedMachine:
         """
         known, n, m = self._known(force), len(near), len(self.machine.actuators)
         tip = commanded = near
-        if rho is not None:
+        if mode == TARGET and tips_only:
+            answer, nominal, tile = known.look(near, force)
+            own, self._aimed, self._tiles = nominal, (near, force, answer, nominal, tile), known.tiles
+        elif rho is not None:
             nominal, tile = self._nominals(near, force)
             own, commanded = rho, _tips(known, rho, near, nominal, tile)
             answer, _, within = known.look(commanded, force, every=False)
@@ -66,6 +72,47 @@ class InterpolatedMachine:
             wrench=np.zeros((n, 6)),
         )  # fmt: skip
         return self._with_exact(out, np.flatnonzero(tile < 0), mode=mode, near=near, force=force, rho=rho)
+
+    def near(self, target: Floats, force: Floats, ends: Bools) -> Near:
+        """Response around targets (n, 3) under forces (n, 3); at the `ends` (n,) with drives, tilt and set-points."""
+        known, m = self._known(force), len(self.machine.actuators)
+        at, between = np.flatnonzero(ends), np.flatnonzero(~ends)
+        answer, tile, status = (
+            np.empty((len(target), BASIC)),
+            np.empty(len(target), np.int64),
+            np.zeros(len(target), np.int64),
+        )
+        known.prepare(target, force)  # a wider range of forces makes new tiles
+        found, nominal, tile[at] = self._looked(known, target[at], force[at])
+        answer[at], rest = found[:, :BASIC], found[:, BASIC:]
+        answer[between], _, tile[between] = known.look(target[between], force[between], every=False)
+        if len(lost := np.flatnonzero(tile < 0)):
+            self._exact += len(lost)
+            aimed, free = (solve(self.machine, mode, target[lost], force=force[lost]) for mode in (TARGET, FREE))
+            answer[lost] = np.concatenate((aimed.commanded, free.tip), axis=1) - np.tile(target[lost], 2)
+            status[lost] = np.where(aimed.status != 0, aimed.status, free.status)
+            own = np.flatnonzero(ends[lost])
+            row = np.searchsorted(at, lost[own])
+            change = aimed.rho - aimed.rho_nominal
+            rest[row] = np.concatenate((aimed.tilt, aimed.drive, change), axis=1)[own]
+            nominal[row] = aimed.rho_nominal[own]
+        parts = np.split(rest, (3, 3 + m), axis=1)
+        return Near(
+            answers=self, target=target, force=force, tiles=known.tiles, tile=tile, status=status, correction=answer[:, :3], unloaded=answer[:, 3:],
+            ends=at, tilt=parts[0], drive=parts[1], change=parts[2], nominal=nominal,
+        )  # fmt: skip
+
+    def _looked(self, known: Field, target: Floats, force: Floats) -> tuple[Floats, Floats, Ints]:
+        """All answers at targets (n, 3) as `look` has them: those that were aimed at last are known."""
+        if self._aimed is None or not len(self._aimed[0]) or known.tiles is not self._tiles:
+            return known.look(target, force)
+        tips, loads, answers, set_points, tiles = self._aimed
+        at = np.empty(len(target), np.int64)
+        same_points(tips, loads, target, force, at)
+        fresh = np.flatnonzero(at < 0)
+        answer, nominal, tile = answers[at], set_points[at], tiles[at]
+        answer[fresh], nominal[fresh], tile[fresh] = known.look(target[fresh], force[fresh])
+        return answer, nominal, tile
 
     def set_points(self, tip: Floats, force: Floats) -> Floats:
         """Set-points (n, m) of commanded tips (n, 3); force (n, 3): that acts there."""
@@ -103,14 +150,15 @@ class InterpolatedMachine:
                 value[rows] = getattr(own, each.name)
         return replace(state, **changed)
 
-    def proof(self, target: Floats, force: Floats) -> tuple[Interpolation | None, int]:
-        """Differences of a sample of points (n, 3) under forces (n, 3) to their exact solutions, and the most iterations.
+    def proof(self, target: Floats, force: Floats, points: int) -> tuple[Interpolation | None, int]:
+        """Differences of a sample of targets (n, 3) under forces (n, 3) to their exact solutions, and the most iterations.
 
-        None and 0: nothing was asked.
+        points: of the program. None and 0: nothing was asked.
         """
         if self._field is None:
             return None, 0
-        chosen = np.random.default_rng(len(target)).permutation(len(target))[:SAMPLE]
+        count = min(MOST_CHECKED, max(MOST_CHECKED // 10, int(CHECKED_SHARE * points)))
+        chosen = np.random.default_rng(len(target)).permutation(len(target))[:count]
         p, f = target[chosen], force[chosen]
         aimed, free = self.solve(TARGET, p, f, None), self.solve(FREE, p, f, None)
         exact = correct(self.machine, p, f)
@@ -118,6 +166,61 @@ class InterpolatedMachine:
         gaps, drive = (aimed.commanded - exact.commanded, free.tip - tip), free.drive - settled.drive
         found = judge(self._field, gaps, aimed.rho - exact.rho, drive, 2 * len(p) + self._exact)
         return found, int(exact.iterations.max(initial=0))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Near:
+    """Response of a machine around n targets, at e ends also of its drives; machine frame, mm, N, rad."""
+
+    answers: InterpolatedMachine
+    target: Floats  # (n, 3)
+    force: Floats  # (n, 3)
+    tiles: Tiles
+    tile: Ints  # (n,) negative: solved by itself
+    status: Ints  # (n,)
+    correction: Floats  # (n, 3) commanded tip minus target that leads the loaded tip to the target
+    unloaded: Floats  # (n, 3) loaded tip minus target when the target itself is commanded
+    ends: Ints  # (e,) which of the targets
+    tilt: Floats  # (e, 3) when the loaded tip is at the target, as drive (e, m)
+    drive: Floats
+    change: Floats  # (e, m) of the set-points by the correction
+    nominal: Floats  # (e, m) set-points of the target
+
+    def tips(self, commanded: Floats) -> Floats:
+        """Loaded tips (n, 3) of commanded tips (n, 3), to first order about those that lead to the targets if near them."""
+        off = commanded - self.target - self.correction
+        out = off.copy()
+        follow(self.tiles.slope, self.tile, off, out)
+        out += self.target
+        far = np.flatnonzero(np.abs(off).max(axis=1) > COARSE_MM)
+        if len(far):
+            out[far] = self.answers.solve(FREE, commanded[far], self.force[far], None, tips_only=True).tip
+        return out
+
+    def state(self, commanded: Floats) -> Correction:
+        """States of the machine (e,) at the ends, to first order as `tips`."""
+        at = self.ends
+        told, off = commanded[at], commanded[at] - self.target[at] - self.correction[at]
+        rho, drive = np.zeros(self.nominal.shape), self.drive
+        follow(self.tiles.rates, self.tile[at], off, rho)
+        rho += self.nominal + self.change
+        far = np.flatnonzero((self.tile[at] < 0) | (np.abs(off).max(axis=1) > COARSE_MM))
+        if len(far):
+            found = self.answers.solve(FREE, told[far], self.force[at[far]], None)
+            rho[far], drive = found.rho, drive.copy()
+            drive[far] = found.drive
+        return self._as_state(told, rho, drive)
+
+    def programmed(self) -> Correction:
+        """States (e,) at the ends when the targets are commanded, without drives and tilt."""
+        return self._as_state(self.target[self.ends], self.nominal, np.full(self.nominal.shape, np.nan))
+
+    def _as_state(self, commanded: Floats, rho: Floats, drive: Floats) -> Correction:
+        held = np.broadcast_to(self.answers.machine.nominal.held_rotation, (len(rho), 3, 3))
+        return Correction(
+            commanded=commanded, rho_nominal=self.nominal, rho=rho, drive=drive, tilt=self.tilt,
+            status=self.status[self.ends], iterations=np.zeros(len(rho), np.int64), rotation=held,
+        )  # fmt: skip
 
 
 def compensate_whole(program: Program, job: Job, *, method: str, **settings: Any) -> Compensated:
@@ -128,7 +231,7 @@ def compensate_whole(program: Program, job: Job, *, method: str, **settings: Any
     job = with_answers(job)
     found = compensate(program, job, method=method, **settings)
     at = job.frame.to_machine(found.rows.target), job.frame.vectors(found.rows.force)
-    interpolated, iterations = job.real_machine.answers.proof(*at)
+    interpolated, iterations = job.real_machine.answers.proof(*at, len(found.rows.target))
     return replace(found, interpolated=interpolated, iterations=max(found.iterations, iterations))
 
 

@@ -17,10 +17,6 @@ class RunEngagement:
     before: Engaged | None
     after: Engaged | None
 
-    def around(self, own: slice) -> list[Engaged]:
-        """Parts for a path in which the motions of the run are `own`, with one motion on either side where there is any."""
-        return self.parts(own.start - 1, own.start, own.stop)
-
     def parts(self, before: int, first: int, after: int) -> list[Engaged]:
         """Parts one behind the other, for motion `before`, the run's motions from `first` on, and motion `after`."""
         parts = [] if first == 0 or self.before is None else [_still(self.before, -1, before)]

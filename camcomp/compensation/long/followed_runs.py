@@ -46,7 +46,7 @@ class FollowedRuns:
                     elif (run.linear.kind != RAPID).any():
                         bounds.tools.add(run.state.tool)
                 elif isinstance(run, InterpretedRun) and run.motions:
-                    bounds.add(runs.program(run.text, run.row0, run.state).path)
+                    bounds.add(runs.program(run).path)
             source.seek(0)
         return cls(job, name, memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds), {})
 

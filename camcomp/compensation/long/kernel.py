@@ -23,6 +23,7 @@ from camcomp.model.statics.vectors import dot, part
 MISSING, SPLIT, EXACT = -3, -1, -2  # what a cell can be besides a tile
 LEVELS = 6
 BIAS = 1 << 17  # cells are counted from here; 2**18 of them per axis
+AHEAD = 4  # rows within which an equal point is looked for
 LANES = 4  # points that are looked up together
 MOST_DEGREE = 8  # highest degree that the evaluation has room for
 BASIC = 6  # outputs that are always asked for: correction (3), shift (3); then tilt (3), drives (m), change of the joints (m)
@@ -245,3 +246,19 @@ def follow(slopes, tile, off, out):
             v, M = part(off[i], 0), slopes[tile[i]]
             for k in range(M.shape[0]):
                 out[i, k] = dot(part(M[k], 0), v)
+
+
+@entry
+def same_points(tips, loads, target, force, at):
+    """Fills at (n,) with the row of tips, loads (k, 3) that equals target, force (n, 3), in order; -1: there is none."""
+    k = 0
+    for i in range(target.shape[0]):
+        at[i] = -1
+        for ahead in range(k, min(k + AHEAD, tips.shape[0])):
+            same = True
+            for j in range(3):
+                same = same and tips[ahead, j] == target[i, j] and loads[ahead, j] == force[i, j]
+            if same:
+                at[i] = ahead
+                k = ahead + 1
+                break

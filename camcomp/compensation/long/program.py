@@ -1,8 +1,7 @@
 """Long programs: read, corrected and written piece by piece, in constant memory.
 
-Runs of linear moves are corrected by interpolation between exact solutions (field.py). What stands between them, and
-all of a program whose machine file states effects or uncertain numbers, is corrected with the lines next to it by
-compensate.py. At the end a random sample of the interpolated rows is solved exactly, and the largest difference is part
+Every piece is corrected by compensate.py. On runs of linear moves, and on all of a program whose machine file states effects
+or uncertain numbers, the machine answers by interpolation between exact solutions (answers.py). At the end a random sample of the interpolated rows is solved exactly, and the largest difference is part
 of the result.
 """
 
@@ -18,17 +17,16 @@ import numpy as np
 
 from camcomp.compensation.long.answers import with_answers
 from camcomp.compensation.long.engagement import RunEngagement
-from camcomp.compensation.long.linear_corrector import LinearCorrector
-from camcomp.compensation.long.linear_run import LinearRun, NotInPieces, Unsolved
-from camcomp.compensation.long.loads import RunContext
-from camcomp.compensation.long.output_state import OutputState
+from camcomp.compensation.long.linear_run import LinearRun, NotInPieces
 from camcomp.compensation.long.proof import Sample
 from camcomp.compensation.long.runs import InterpretedRun, Runs
 from camcomp.compensation.long.totals import TotalsOfPieces
 from camcomp.compensation.program.compensate import compensate
-from camcomp.compensation.program.moves import minutes_of, raise_unsolved
+from camcomp.compensation.program.moves import minutes_of
 from camcomp.compensation.program.totals import JointTableRows
-from camcomp.gcode.output import Part
+from camcomp.gcode.output import Part, Standing
+from camcomp.gcode.path_mode import PathMode
+from camcomp.gcode.program import Program
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.stamp import is_stamped, stamp_index, stamp_text
 from camcomp.gcode.text import Text
@@ -71,25 +69,22 @@ class LongProgram:
                 raise CheckFailed("CC603", f"{self.name} was compensated before")
             rest = block[-LINE_OF_STAMP:]
         source.seek(0)
-        self._output = OutputState(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
+        x, y, z = map(float, self.setup.start_mm)
+        self._output = Standing((x, y, z))
         self._told: Future[None] = Future()
         self._told.set_result(None)
         self.totals = TotalsOfPieces(
             self.job, self.name, tolerance_um=self.tolerance_um, tabled=self.on_rows is not None
         )
-        self._by_points = bool(self.job.config.uncertain or self.job.causes)
-        self._pointwise = with_answers(self.job) if self._by_points else self.job
+        if self.job.conditions.model is not None and not self.job.conditions.steady:
+            raise NotInPieces
+        self._interpolated = with_answers(self.job)
         self._minutes = 0.0  # of the pieces so far
         self._sample = Sample(digest.hexdigest(), size)
         self._lines = max(lines, 1)
         self.totals.lines_in = lines
         self._stock = _stock_of(self.job, source, self.name, self.setup)
-        top = self.job.conditions.stock_top_mm if self.job.conditions.model and self._stock is None else None
-        self._runs = Runs(
-            source=source, name=self.name, setup=self.setup, dialect=self.job.config.control.dialect,
-            top_mm=np.nan if top is None else top,
-        )  # fmt: skip
-        self._corrector = LinearCorrector(self.job, self.tolerance_um, self._runs.language, self._runs.feed_point)
+        self._runs = Runs(source=source, name=self.name, setup=self.setup, dialect=self.job.config.control.dialect)
         self._stamp: str | None = stamp_text(digest.hexdigest(), self.version, self.job.fingerprint)
         with ThreadPoolExecutor(1) as self._beside:
             for data in self._pieces():
@@ -98,7 +93,7 @@ class LongProgram:
             self._told.result()
         totals = self.totals
         totals.finish(self._runs, [] if self._stock is None else self._stock.finish())
-        totals.interpolated, iterations = self._sample.proof(self._corrector, totals.points, self._pointwise)
+        totals.interpolated, iterations = self._sample.proof(self._interpolated, totals.points)
         totals.iterations = max(totals.iterations, iterations)
         return totals
 
@@ -148,29 +143,36 @@ class LongProgram:
         return data[:at] + stamp + data[at:]
 
     def _corrected(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
-        if isinstance(piece.run, LinearRun) and not self._by_points:
-            return self._linear(piece.run, piece, before, after)
-        return self._exactly(piece, before, after)
+        """A piece, with the ends of the motions on either side in sight.
 
-    # --- linear moves ---------------------------------------------------------------------------------------------
-
-    def _linear(self, run: LinearRun, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
-        try:
-            edges = (before.last if before else None, after.first if after else None)
-            context = RunContext(run, *edges, self._engagement_of(piece, before, after))
-            done = self._corrector.correct(context, self._output)
-        except Unsolved as error:
-            target = self.job.frame.to_program(error.target)
-            raise_unsolved(error.move, target, error.status, lambda i: run.place(self.name, i))
-            raise  # every point of it has a status
+        Machines without effects are interpolated along linear moves only; other lines are few.
+        """
+        by_points = bool(self.job.config.uncertain or self.job.causes)
+        job = self._interpolated if by_points or isinstance(piece.run, LinearRun) else self.job
+        first = int(before is not None)
+        part = Part(first, first + len(piece.path), self._output)
+        program = piece.between(before, after)
+        engaged = self._engagement_of(piece, before, after)
+        here, minutes = piece.run.row0 / self._lines, minutes_of(self.job, program.path)
+        began = self._minutes - float(minutes[:first].sum())
+        self._minutes += float(minutes[part.first : part.last].sum())
+        with part_of_work(here, here):
+            result = compensate(
+                program, job, method="newton", tolerance_um=self.tolerance_um, version=self.version, part=part,
+                arcs=self.arcs, began_min=began, engaged=None if engaged is None else Engaged.joined(engaged.parts(0, first, len(program.path) - 1)),
+            )  # fmt: skip
+        own = slice(*np.searchsorted(result.rows.motion, (part.first, part.last)).tolist())
+        assert result.written.behind is not None
+        self._output = result.written.behind
 
         def tell() -> JointTableRows:
-            rows = self.totals.add_linear(run, done, self._corrector)
-            self._sample.add(self._corrector, done, rows)
+            rows = self.totals.add_piece(result, own, part)
+            if job is not self.job:
+                self._sample.add(self.job, rows, result.rows.corrected[own])
             return rows
 
         self._tell(tell)
-        return done.data
+        return result.written.data
 
     def _engagement_of(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> RunEngagement | None:
         """Engagement of the tool on a piece and next to it."""
@@ -193,42 +195,6 @@ class LongProgram:
         self._told.result()
         self._told = self._beside.submit(tell)
 
-    # --- other lines ---------------------------------------------------------------------------------------------
-
-    def _exactly(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
-        """Point by point, with the motions on either side in sight."""
-        run, (head, first), (tail, behind) = piece.run, (b"", 0), (b"", 0)
-        _, state, row0, _ = run.lines_from(0)
-        if before is not None:
-            head, state, row0, first = before.run.lines_from(before.ends[1])
-        if after is not None:
-            tail, behind = after.run.lines_until(after.ends[0])
-        program = self._runs.program(head + run.text + tail, row0, state)
-        part = Part(first, len(program.path) - behind, self._output.standing())
-        if part.last - part.first != run.motions:
-            raise NotInPieces
-        engaged = self._engagement_of(piece, before, after)
-        here, minutes = row0 / self._lines, minutes_of(self.job, program.path)
-        began = self._minutes - float(minutes[:first].sum())
-        self._minutes += float(minutes[part.first : part.last].sum())
-        with part_of_work(here, here):
-            result = compensate(
-                program, self._pointwise, method="newton", tolerance_um=self.tolerance_um, version=self.version, part=part,
-                arcs=self.arcs, began_min=began, engaged=None if engaged is None else Engaged.joined(engaged.parts(0, first, len(program.path) - 1)),
-            )  # fmt: skip
-        own = (result.rows.motion >= part.first) & (result.rows.motion < part.last)
-        assert result.written.behind is not None
-        self._output.take(result.written.behind, result.rows.end[np.flatnonzero(own)[-1]])
-
-        def tell() -> JointTableRows:
-            rows = self.totals.add_piece(result, own, part)
-            if self._pointwise is not self.job:
-                self._sample.add_points(self.job, rows, result.rows.corrected[own])
-            return rows
-
-        self._tell(tell)
-        return result.written.data[len(head) : len(result.written.data) - len(tail)]
-
 
 def _stock_of(job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRuns | None:
     if job.config.workpiece.stock is None:
@@ -242,15 +208,35 @@ class _Piece:
     """A run with what its neighbours need to know of it. Raises NotInPieces for a run without a motion of a length."""
 
     def __init__(self, run: LinearRun | InterpretedRun, runs: Runs) -> None:
-        self.run = run
+        self.run, self._program = run, runs.program(run)
         self.engaged: Engaged | None = None  # what the tool meets, or, as long as it is only looked at, at its begin
-        path = run.path if isinstance(run, LinearRun) else runs.program(run.text, run.row0, run.state).path
-        self.path = path
+        self.path = path = self._program.path
         real = np.flatnonzero((path.kind == RAPID) | (path_geometry.lengths(path) > 0.0))
-        if not len(real):
+        if not len(real) or len(path) != run.motions:
             raise NotInPieces
         self.ends = (int(real[0]), int(real[-1]))
         self.first, self.last = (_straight(path, k, u) for k, u in zip(self.ends, (0.0, 1.0), strict=True))
+
+    def between(self, before: _Piece | None, after: _Piece | None) -> Program:
+        """Its program with the end of the motion in front of it and the begin of that behind it, which have no words."""
+        program, n = self._program, len(self.path)
+        paths, modes, rows = [self.path], program.modes, np.arange(n)
+        if before is not None:
+            paths, modes = [before.last, *paths], (before.modes[before.ends[1]], *modes)
+            rows = np.append(0, rows)
+        if after is not None:
+            paths, modes = [*paths, after.first], (*modes, after.modes[after.ends[0]])
+            rows = np.append(rows, n - 1)
+        shift = int(before is not None)
+        return replace(
+            program, path=Path.joined(paths), sites=program.sites.take(rows), modes=modes,
+            rebases=tuple(replace(each, motion=each.motion + shift) for each in program.rebases),
+        )  # fmt: skip
+
+    @property
+    def modes(self) -> tuple[PathMode, ...]:
+        """Path mode of every motion."""
+        return self._program.modes
 
 
 def _straight(path: Path, k: int, u: float) -> Path:

@@ -9,11 +9,8 @@ import numpy as np
 from camcomp.compensation.long.field import Field
 from camcomp.compensation.program.result import BOUND_UM, Interpolation
 from camcomp.ground.datatypes import Bools, Floats
-from camcomp.model.statics.solve import inverse
-from camcomp.model.statics.target import correct, settle
 
 if TYPE_CHECKING:
-    from camcomp.compensation.long.linear_corrector import CorrectedRun, LinearCorrector
     from camcomp.compensation.program.totals import JointTableRows
     from camcomp.model.job import Job
 
@@ -40,40 +37,20 @@ class Sample:
     def __init__(self, digest: str, size: int) -> None:
         self._random = np.random.default_rng(int(digest[:16], 16))
         self._share = min(1.0, 3.0 * MOST_CHECKED * 24.0 / max(size, 1))  # a line has some 24 bytes
-        self._rows: list[Floats] = []
-        self._points: list[Floats] = []  # of pieces on an interpolated machine: target (3), force (3), machine frame
+        self._points: list[Floats] = []  # target (3) and force (3), machine frame
 
-    def add(self, corrector: LinearCorrector, done: CorrectedRun, rows: JointTableRows) -> None:
-        """Draw some of the rows of a run."""
-        chosen = np.flatnonzero(self._random.random(len(rows.s)) < self._share)
-        if len(chosen):
-            answers, target = done.answers, corrector.job.frame.to_machine(rows.target)
-            drive = answers.rest[:, 3 : 3 + rows.drive.shape[1]]
-            moves = (answers.correction, answers.unloaded, drive, rows.joints, corrector.off(done))
-            self._rows.append(np.concatenate([each[chosen] for each in (target, rows.force, *moves)], axis=1))
-
-    def add_points(self, job: Job, rows: JointTableRows, corrected: Bools) -> None:
+    def add(self, job: Job, rows: JointTableRows, corrected: Bools) -> None:
         """Draw some of the corrected rows (N,) of a piece."""
         chosen = np.flatnonzero(corrected & (self._random.random(len(rows.s)) < self._share))
         target = job.frame.to_machine(rows.target[chosen])
         self._points.append(np.concatenate((target, rows.force[chosen]), axis=1))
 
-    def proof(self, corrector: LinearCorrector, points: int, job: Job) -> tuple[Interpolation | None, int]:
+    def proof(self, job: Job, points: int) -> tuple[Interpolation | None, int]:
         """Differences of rows to their exact solutions, and the most iterations.
 
-        points: rows of the program. job: of the pieces that were not corrected as runs of linear moves.
+        job: with the machine that was interpolated. points: rows of the program.
         """
-        if self._points:
-            target, force = np.split(np.concatenate(self._points), [3], axis=1)
-            return job.real_machine.answers.proof(target, force)  # type: ignore[no-any-return]
-        if corrector.field is None or not self._rows:
+        if not self._points:
             return None, 0
-        machine, sample = corrector.machine, np.concatenate(self._rows)
-        count, m = min(MOST_CHECKED, max(MOST_CHECKED // 10, int(CHECKED_SHARE * points))), len(machine.actuators)
-        sample = sample[self._random.permutation(len(sample))[:count]]
-        sample = sample[np.lexsort(sample[:, :3].T)]
-        p, f, correction, unloaded, drive, joints, off = np.split(sample, np.cumsum([3, 3, 3, 3, m, m]), axis=1)
-        exact, (tip, _) = correct(machine, p, f), settle(machine, p, f)
-        gaps, written = (exact.commanded - p - correction, tip - p - unloaded), inverse(machine, p + correction + off)
-        found = judge(corrector.field, gaps, written - joints, exact.drive - drive, 2 * len(p) + 2 * corrector.exact)
-        return found, int(exact.iterations.max())
+        target, force = np.split(np.concatenate(self._points), [3], axis=1)
+        return job.real_machine.answers.proof(target, force, points)  # type: ignore[no-any-return]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from typing import BinaryIO
 
@@ -19,7 +18,7 @@ from camcomp.gcode.detect import dialect_of
 from camcomp.gcode.interpret import Interpreter, controller
 from camcomp.gcode.linear_lines import LONGEST_END, MORE, LinearMotions, scan
 from camcomp.gcode.linear_reader import follow, is_linear, motion_number
-from camcomp.gcode.program import Program
+from camcomp.gcode.program import Program, Rebase
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import END_OF_LINE, Text
@@ -55,14 +54,7 @@ class InterpretedRun:
     row0: int
     state: ControlState  # in front of it
     motions: int
-
-    def lines_from(self, _motion: int) -> tuple[bytes, ControlState, int, int]:
-        """The lines, the control in front of them, the lines before them, and their motions; all of them for any motion."""
-        return self.text, self.state, self.row0, self.motions
-
-    def lines_until(self, _motion: int) -> tuple[bytes, int]:
-        """The lines, and their motions."""
-        return self.text, self.motions
+    stated: list[bool]  # motion code and feed were stated between the motion in front of it and its first line
 
 
 @dataclass(eq=False, kw_only=True)
@@ -73,7 +65,6 @@ class Runs:
     name: str
     setup: Setup
     dialect: str | None
-    top_mm: float = np.nan  # of the stock: where cutting begins
     warnings: list[str] = field(default_factory=list)
     behind_end: list[str] = field(default_factory=list)
     motions: int = 0
@@ -114,7 +105,7 @@ class Runs:
             if line is None:
                 break
             if before is not None:
-                held.start(row, deepcopy(before))
+                held.start(row, before.copy(), list(self._flags))
             motions, ended = self._interpret(line)
             held.add(line, motions)
         if held.lines:
@@ -183,7 +174,7 @@ class Runs:
         room, position, begin = LinearMotions.room(limit), np.array(state.position), self._at
         n, rows, at, why, code, feed, coded, fed = scan(
             self._data, begin, len(self._data), self._last, motion_number(state), state.feed or 0.0, *self._flags,
-            position, state.unit, np.array(state.offset), self.language.increments, self.top_mm, room, limit,
+            position, state.unit, np.array(state.offset), self.language.increments, room, limit,
         )  # fmt: skip
         if why == MORE and n == 0 and self._more():
             return self._linear(limit)
@@ -196,7 +187,7 @@ class Runs:
         self.motions += n
         waits, state.waits = state.waits, False
         return LinearRun(
-            data=self._data, text_at=begin, text_end=at, row0=row0, linear=room.take(0, n), state=deepcopy(state),
+            data=self._data, text_at=begin, text_end=at, row0=row0, linear=room.take(0, n), state=state.copy(),
             waits=waits,
         )  # fmt: skip
 
@@ -236,18 +227,23 @@ class Runs:
         if not reader.straight or reader.record.cycles:
             raise NotInPieces
 
-    def program(self, text: bytes, row0: int, state: ControlState) -> Program:
-        """Some lines as a program of their own, from a state of the control on."""
-        piece = Piece(self.name, text.decode("latin-1"), "latin-1", b"", row0)
-        reader = self.reader(piece, deepcopy(state))
-        reader.warnings = []
-        controller(reader).run()
-        self.check(reader)
-        path, sites = reader.record.finish()
+    def program(self, run: LinearRun | InterpretedRun) -> Program:
+        """A run as a program of its own, from the state of the control in front of it on."""
+        text = Piece(self.name, run.text.decode("latin-1"), "latin-1", b"", run.row0)
+        rebases: tuple[Rebase, ...] = ()
+        if isinstance(run, LinearRun):
+            path, sites, modes = run.path, run.sites, (run.state.path_mode,) * run.motions
+        else:
+            reader = self.reader(text, run.state.copy())
+            reader.warnings = []
+            reader.record.code_stated, reader.record.feed_stated = run.stated
+            controller(reader).run()
+            self.check(reader)
+            (path, sites), modes, rebases = reader.record.finish(), tuple(reader.record.modes), tuple(reader.rebases)
+            path = replace(path, line=path.line + run.row0)
         return Program(
-            data=text, name=self.name, dialect=self.language.name, path=replace(path, line=path.line + row0), warnings=(),
-            text=piece, sites=sites, rebases=tuple(reader.rebases), setup=self.setup, language=self.language, feed_point=self.feed_point,
-            modes=tuple(reader.record.modes), straight=True,
+            data=run.text, name=self.name, dialect=self.language.name, path=path, warnings=(), text=text, sites=sites,
+            rebases=rebases, setup=self.setup, language=self.language, feed_point=self.feed_point, modes=modes, straight=True,
         )  # fmt: skip
 
 
@@ -259,10 +255,11 @@ class _InterpretedLines:
         self._motions = 0
         self._row0 = 0
         self._state: ControlState | None = None
+        self._stated = [False, False]
 
-    def start(self, row0: int, state: ControlState) -> None:
-        """The first line is going to be line row0; `state` in front of it."""
-        self._row0, self._state = row0, state
+    def start(self, row0: int, state: ControlState, stated: list[bool]) -> None:
+        """The first line is going to be line row0; `state` in front of it, and what was `stated` since a motion."""
+        self._row0, self._state, self._stated = row0, state, stated
 
     def add(self, lines: bytes, motions: int) -> None:
         """Add lines and the number of their motions."""
@@ -272,6 +269,6 @@ class _InterpretedLines:
     def take(self) -> InterpretedRun:
         """Return the collected lines as a run, and start anew."""
         assert self._state is not None
-        run = InterpretedRun(b"".join(self.lines), self._row0, self._state, self._motions)
+        run = InterpretedRun(b"".join(self.lines), self._row0, self._state, self._motions, self._stated)
         self.lines, self._motions, self._state = [], 0, None
         return run

@@ -14,6 +14,7 @@ import numpy as np
 from camcomp.compensation.program.chords import SHARE, Nodes, divide
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, Bools, Floats, Ints
+from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 
 LARGEST = 2.0 * np.pi / 3.0  # rad, sweep of one arc; rounding moves the middle of longer ones too much
@@ -47,6 +48,9 @@ class Bend:
     @classmethod
     def of(cls, track: Track, trial: Nodes, commanded: Floats, second: Floats, tolerance: Floats, able: Bools) -> Bend:
         """Arcs for the pieces (p,) that are `able` and need few enough of them."""
+        if not (able & (track.path.kind[track.motion] == ARC)).any():
+            none = np.zeros(len(able))
+            return cls(second, second, none, none > 0.0, none.astype(np.int64))
         axis = track.path.axis[track.motion][trial.piece]
         along = tangents(trial, commanded)
         side = np.cross(axis, along)
@@ -67,6 +71,8 @@ class Bend:
 
     def divided(self, trial: Nodes, tolerance: Floats) -> tuple[Nodes, Floats]:
         """Division points and their shifts."""
+        if len(trial.w) == 2 * len(tolerance) and not self.use.any():
+            return trial, np.zeros_like(self.lines)
         second = np.where(self.use[trial.piece][:, None], self.arcs, self.lines)
         fewest = np.where(self.use, np.ceil(self.sweep / LARGEST - 1e-9), 0.0)
         least = np.where(fewest > 1.0, fewest * np.sqrt(SHARE * np.minimum(tolerance, 1.0)), 0.0)
@@ -112,7 +118,7 @@ def through(start: Floats, middle: Floats, end: Floats, axis: Floats, way: Float
 
     a, b = level(end - start), level(middle - start)
     area = np.sum(axis * np.cross(b, a), axis=1)  # > 0: counter-clockwise
-    chord = np.linalg.norm(a, axis=1)
+    chord = sizes(a)
     bent = np.abs(area) > flat * np.maximum(chord, 1e-12)
     wrong = bent & (area * way <= 0.0)
     good = bent & ~wrong
@@ -142,11 +148,11 @@ def stated_sweeps(start: Floats, end: Floats, centre: Floats, axis: Floats, angl
 
 def lengths(start: Floats, end: Floats, arcs: Arcs, axis: Floats) -> Floats:
     """Lengths (k,) mm of moves that may be arcs."""
-    straight = np.linalg.norm(end - start, axis=1)
+    straight = sizes(end - start)
     p = start - arcs.centre
     p = p - np.sum(p * axis, axis=1, keepdims=True) * axis
     climb = np.sum((end - start) * axis, axis=1)
-    out: Floats = np.where(arcs.on, np.hypot(np.linalg.norm(p, axis=1) * np.abs(arcs.angle), climb), straight)
+    out: Floats = np.where(arcs.on, np.hypot(sizes(p) * np.abs(arcs.angle), climb), straight)
     return out
 
 
@@ -160,7 +166,7 @@ def along(start: Floats, end: Floats, arcs: Arcs, axis: Floats, f: Floats) -> Fl
         low, high = np.sum(p * a, axis=1), np.sum(q * a, axis=1)
         p, q = p - low[:, None] * a, q - high[:, None] * a
         angle = stated_sweeps(s, e, c, a, arcs.angle[on])
-        growth = np.linalg.norm(q, axis=1) / np.maximum(np.linalg.norm(p, axis=1), 1e-300) - 1.0
+        growth = sizes(q) / np.maximum(sizes(p), 1e-300) - 1.0
         height = low + f[on] * (high - low)
         out[on] = c + path_geometry.turn(p, a, f[on] * angle) * (1.0 + growth * f[on])[:, None] + height[:, None] * a
     return out

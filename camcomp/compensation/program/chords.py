@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.vectors import sizes
 
 END_STEP = 0.85  # largest miss of an end step = that of an inner one (0.062 against 0.0625 of |x''| h^2)
 SHARE = 16.0  # inner step: miss = |x''| h^2 / SHARE
@@ -28,6 +29,8 @@ class Nodes:
 
     def among(self, others: Nodes) -> tuple[Ints, Ints]:
         """Which of others (m >= 1,) each node (k,) is, and the nodes that are none of them."""
+        if self is others:
+            return np.arange(len(self.w)), np.zeros(0, np.int64)
         known, own = 2.0 * others.piece + others.w, 2.0 * self.piece + self.w
         at = np.minimum(np.searchsorted(known, own), len(known) - 1)
         return at, np.flatnonzero(known[at] != own)
@@ -49,8 +52,10 @@ def _spread(count: Ints) -> Nodes:
 
 def second_derivative(nodes: Nodes, x: Floats) -> Floats:
     """x''(w) (k, c) at every node, from parabolas through three even-spaced neighbours; x (k, c) mm."""
-    count = np.diff(nodes.first)[nodes.piece]
     second = np.zeros_like(x)
+    if len(nodes.w) == 2 * (len(nodes.first) - 1):
+        return second
+    count = np.diff(nodes.first)[nodes.piece]
     second[1:-1] = x[2:] - 2.0 * x[1:-1] + x[:-2]
     k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
     rows = np.arange(len(k)) + (k == 0) - (k == count - 1)
@@ -67,7 +72,7 @@ def divide(nodes: Nodes, second: Floats, tolerance: Floats, least: Floats | None
     if not len(tolerance):
         return nodes, np.zeros((0, second.shape[1]))
     floor = np.zeros(len(tolerance)) if least is None else least
-    g = np.maximum(np.sqrt(np.linalg.norm(second, axis=1)), floor[nodes.piece])
+    g = np.maximum(np.sqrt(sizes(second)), floor[nodes.piece])
     dw = np.diff(nodes.w)
     area = np.concatenate(([0.0], np.cumsum(np.where(dw > 0.0, 0.5 * (g[1:] + g[:-1]) * dw, 0.0))))
     start = area[nodes.first[:-1]]
@@ -85,7 +90,7 @@ def divide(nodes: Nodes, second: Floats, tolerance: Floats, least: Floats | None
     w = np.where(inner, np.clip(w, 0.0, 1.0), np.where(k == 0, 0.0, 1.0))
     key, at = nodes.w + 2.0 * nodes.piece, w + 2.0 * out.piece
     bend = np.stack([np.interp(at, key, each) for each in second.T], axis=1)
-    size = np.maximum(np.linalg.norm(bend, axis=1), floor[out.piece] ** 2)
+    size = np.maximum(sizes(bend), floor[out.piece] ** 2)
     miss = (total[out.piece] / np.maximum(n - slack, 1.0)) ** 2 / SHARE  # |x''| h^2 / SHARE, the same at every step
     shift = np.where((inner & (size > 0.0))[:, None], -bend * (miss / np.maximum(size, 1e-300))[:, None], 0.0)
     return Nodes(out.piece, w, out.first), shift

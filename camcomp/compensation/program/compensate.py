@@ -15,7 +15,7 @@ from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.arcs_out import Arcs, Bend
 from camcomp.compensation.program.chords import Nodes, second_derivative, trial_nodes
-from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of
+from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of, times_of
 from camcomp.compensation.program.judged_points import (
     JudgedPoints,
     Seen,
@@ -44,6 +44,7 @@ from camcomp.compensation.program.table_knots import cut_at_knots
 from camcomp.compensation.program.uncertainty import Uncertainty
 from camcomp.compensation.program.under_control import (
     UnderControl,
+    may_pay_apart,
     rests,
     stays_apart,
     under_control,
@@ -55,6 +56,7 @@ from camcomp.gcode.uncorrected import below_step_warning
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.progress import part as part_of_work
+from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.assumed import ForceDoubts
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
@@ -222,7 +224,7 @@ class _Correction:
             curve = np.column_stack((curve, lengths))
             self.kept &= self.orienting.kept(track, trial, self.aimed.words)
         self.second = second_derivative(trial, curve)
-        most = _largest(track, trial, np.linalg.norm(correction, axis=1))
+        most = _largest(track, trial, sizes(correction))
         self.goal = error_goals(self.tolerance_um, self.step, most)
         self.budget = chord_budget(self.goal, self.step)
         if self.shares is not None:
@@ -235,22 +237,26 @@ class _Correction:
         piece, w, of = nodes.piece[on], nodes.w[on], np.arange(int(on.sum()))
         if orienting is None:
             piece, w, of = without_shared_ends(track, piece, w)
-        rapids = np.flatnonzero(self.corrected & (track.path.kind[track.motion] == RAPID) & (track.length > 0.0))
-        if not job.causes:
-            rapids = rapids[:0]
-        between, at = np.repeat(rapids, len(WITHIN_RAPID)), np.tile(WITHIN_RAPID, len(rapids))
-        order = np.lexsort((np.concatenate((w, at)), np.concatenate((piece, between))))  # drives remember their turns
-        asked = np.argsort(order, kind="stable")[: len(piece)][of]
-        piece, w = np.concatenate((piece, between))[order], np.concatenate((w, at))[order]
+        asked = of
+        if job.causes:  # drives remember their turns within rapids
+            rapids = np.flatnonzero(self.corrected & (track.path.kind[track.motion] == RAPID) & (track.length > 0.0))
+            between, at = np.repeat(rapids, len(WITHIN_RAPID)), np.tile(WITHIN_RAPID, len(rapids))
+            order = np.lexsort((np.concatenate((w, at)), np.concatenate((piece, between))))
+            asked = np.argsort(order, kind="stable")[: len(piece)][of]
+            piece, w = np.concatenate((piece, between))[order], np.concatenate((w, at))[order]
         target, travel = track.points(piece, w), travel_of(job, track, piece, w)
         words = np.zeros((len(nodes.piece), 3))
         if orienting is None:
-            result = aim_at(job, target, travel, self.method)
+            result = aim_at(job, target, travel, self.method, tips_only=True)
         else:
             words = orienting.programmed(track, nodes.piece, nodes.w)
             result, turned = orienting.aim(target, travel, orienting.programmed(track, piece, w))
             words[on] = turned[asked]
-        refuse_unsolved(self.program, track, piece, target, result.status)
+        status = result.status
+        if self.part is not None:  # the others are refused as parts of their own
+            own = (track.motion[piece] >= self.part.first) & (track.motion[piece] < self.part.last)
+            status = np.where(own, status, 0)
+        refuse_unsolved(self.program, track, piece, target, status)
         out = track.points(nodes.piece, nodes.w)
         out[on] = result.commanded[asked]
         if self.shares is not None:
@@ -358,7 +364,7 @@ class _Correction:
         if self.shares is not None:
             left = self.shares.left(job, track, points.piece, points.w, travel=points.travel, before=points.before)
         missed = after.error if left is None else after.error - left
-        size = np.where(after.status == 0, np.linalg.norm(missed, axis=1), np.inf)
+        size = np.where(after.status == 0, sizes(missed), np.inf)
         if after.tilt is not None:
             size = np.maximum(size, np.nan_to_num(after.tilt) * self.goal[points.piece] / MOST_TILT_RAD)
         worst = np.zeros(len(self.goal))
@@ -377,12 +383,15 @@ class _Correction:
         """The corrected program, its arcs as arcs or as lines."""
         program, job, track = self.program, self.job, self.track
         found = self._divided(arcs and self.orienting is None)  # a circle of the tip does not turn the tool as needed
-        rows, points, after, judged = found.rows, found.points, found.after, found.points.judged
+        rows, points, after, judged = found.rows, found.points, found.after, np.flatnonzero(found.points.judged)
         with part_of_work(0.8, 1.0, points=True):
             before = see_original(job, points)
         for seen in (after, before):
-            refuse_unsolved(program, track, points.piece[judged], points.target[judged], seen.status[judged])
-        still = np.intersect1d(cut_without_spindle(track), program.path.line[track.motion[self.feeding]])
+            bad = judged[seen.status[judged] != 0]
+            refuse_unsolved(program, track, points.piece[bad], points.target[bad], seen.status[bad])
+        still = cut_without_spindle(track)
+        if len(still):
+            still = np.intersect1d(still, program.path.line[track.motion[self.feeding]])
         written, control = self._controlled(found)
         warnings = [*program.warnings, *self._warnings(control, still)]
         line, nominal = program.path.line[rows.motion], before.state.rho_nominal
@@ -392,8 +401,8 @@ class _Correction:
             state = whole_pose(job, points, found.commanded, rows.corrected, state)
         s = track.s0[rows.piece] + rows.w * track.length[rows.piece]
         return Compensated(
-            program=program, written=written, rows=rows, s=s, t=_times(job, program, rows, s), nominal=nominal, state=state,
-            force=acting_force(job, state.rho, points.travel.take(points.end)), uncorrected=before.tip,
+            program=program, written=written, rows=rows, s=s, t=times_of(job, program, rows, s), nominal=nominal, state=state,
+            force=acting_force(job, state.rho, points.travel, points.end), uncorrected=before.tip,
             before=before.error[judged], after=after.error[judged], control=control, judged=points.row[judged],
             iterations=self.aimed.iterations, method=self.method, without_spindle=still, warnings=warnings,
             bands=self._bands(found, before, written), left=None if found.left is None else found.left[judged],
@@ -410,9 +419,10 @@ class _Correction:
             told=found.commanded, missed=found.missed, rest=rest, tolerance_um=self.tolerance_um,
         )  # fmt: skip
         control = planned()
-        if self.part is None and control.stated and 1e3 * control.off_joins > self.tolerance_um * (1.0 + 1e-9):
-            apart = stays_apart(self.program, rows)
-            if apart.any() and (other := planned(apart=apart)).better_than(control, self.tolerance_um):
+        apart = stays_apart(self.program, rows, self.part)
+        if apart.any() and control.stated and may_pay_apart(control, rows, self.part, self.tolerance_um):
+            other = planned(apart=apart)
+            if self.part is not None or other.better_than(control, self.tolerance_um):
                 return self._rewritten(rows, rest, apart), other
         return written, control
 
@@ -460,15 +470,6 @@ class _Aimed:
     commanded: Floats  # (k, 3) program frame
     iterations: int
     words: Floats  # (k, 3) of the orientation, zero where the program states none
-
-
-def _times(job: Job, program: Program, rows: CorrectedRows, s: Floats) -> Floats:
-    """Time (N,) s at end points by the programmed feed, s (N,) mm along the path; rapids take none."""
-    feed = program.path.feed[rows.motion]
-    speed = np.where(np.isnan(feed), job.config.process.feed_mm_per_min or np.nan, feed)
-    moving = (rows.kind != RAPID) & (speed > 0.0)
-    out: Floats = np.cumsum(np.where(moving, np.diff(s, prepend=0.0) / np.where(moving, speed, 1.0) * 60.0, 0.0))
-    return out
 
 
 def _spacing(job: Job) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from camcomp.compensation.program.result import ErrorSum
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.source_lines import MOST_LINES, named_lines
+from camcomp.ground.vectors import sizes
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves
 from camcomp.model.trajectory.plan import plan_of
 
@@ -131,7 +132,7 @@ class ControlAccount:
     def _judge(self, points: PointsOnMoves, error: Floats) -> None:
         self.latest = error
         self.errors.add(error)
-        size = np.linalg.norm(error, axis=1)
+        size = sizes(error)
         far = np.flatnonzero(np.isfinite(size) & (size > self.tolerance * (1.0 + ROUND_OFF)))
         if len(far):
             size, joined = 1e3 * size[far], points.joined[far]

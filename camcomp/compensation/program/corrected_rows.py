@@ -14,6 +14,7 @@ from camcomp.compensation.program.moves import refuse_unsolved, row_layout, trav
 from camcomp.gcode.output import Output
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import aim_at
@@ -70,29 +71,20 @@ def corrected_rows(
     kind = path.kind[track.motion]
     start, stop = commanded[nodes.first[:-1]], commanded[nodes.first[1:] - 1]
     before = path.start[:1] if begins else start[:1]
-    step = np.linalg.norm(start - np.concatenate((before, stop[:-1])), axis=1)
+    step = sizes(start - np.concatenate((before, stop[:-1])))
     layout = row_layout(path, track, step, program.step_mm(job.config.control.resolution_mm))
     keep = (k > 0) | layout.leading[nodes.piece]
     extra = np.flatnonzero(layout.trailing)
     piece = np.concatenate((nodes.piece[keep], extra))
     w = np.concatenate((nodes.w[keep], np.ones(len(extra))))
     joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
-    free, turned = track.points(extra, np.ones(len(extra))), np.zeros((len(extra), 3))
-    if len(extra):  # behind the cut, without its force
-        unloaded = replace(travel_of(job, track, extra, np.ones(len(extra))), force=np.zeros((len(extra), 3)))
-        if orienting is None:
-            result = aim_at(job, free, unloaded, "newton")
-        else:
-            near = orienting.programmed(track, extra, np.ones(len(extra)))
-            result, turned = orienting.aim(free, unloaded, near)
-        refuse_unsolved(program, track, extra, free, result.status)
-        aimed = result.commanded
-        behind = np.minimum(extra + 1, len(kind) - 1)  # where the next piece begins, with its share
-        free = aimed if shares is None else shares.taken(track, behind, np.zeros(len(extra)), free, aimed)
+    free, turned = _behind_cuts(program, job, track, extra, shares=shares, orienting=orienting)
     end = np.concatenate((commanded[keep], free))
     circles = circles.take(np.flatnonzero(keep)).followed_by(len(extra))
-    order = np.lexsort((joining & (w > 0.0), w, piece))
-    piece, w, joining, end, circles = piece[order], w[order], joining[order], end[order], circles.take(order)
+    order = np.arange(len(piece))
+    if len(extra):
+        order = np.lexsort((joining & (w > 0.0), w, piece))
+        piece, w, joining, end, circles = piece[order], w[order], joining[order], end[order], circles.take(order)
     trailing_row = joining & (w > 0.0)
     target = track.points(piece, w)
     force = track.force(piece, w)
@@ -102,7 +94,9 @@ def corrected_rows(
     whole = (passed | kept[piece]) & ~joining & (np.bincount(piece, minlength=len(kind)) == 1)[piece]
     rows_kind = np.where(circles.on, ARC, np.where(whole, kind[piece], rows_kind))
     end[whole & ~circles.on] = target[whole & ~circles.on]
-    engagement = np.column_stack(track.sizes(piece, w))
+    engagement = (
+        np.broadcast_to(np.nan, (len(piece), 2)) if track.engaged is None else np.column_stack(track.sizes(piece, w))
+    )
     if orienting is not None and words is not None:
         words = np.concatenate((words[keep], turned))[order]
         words[whole] = orienting.programmed(track, piece, w)[whole]
@@ -111,6 +105,26 @@ def corrected_rows(
         target=target, end=end, feed=np.empty(len(piece)), arcs=circles, engagement=engagement, words=words,
     )  # fmt: skip
     return replace(rows, feed=_feeds(program, track, rows))
+
+
+def _behind_cuts(
+    program: Program, job: Job, track: Track, piece: Ints, *, shares: Shares | None, orienting: Orienting | None
+) -> tuple[Floats, Floats]:
+    """Commanded tips (e, 3) mm behind the cuts of pieces (e,), without their force, and words (e, 3) of the orientation."""
+    one = np.ones(len(piece))
+    target, turned = track.points(piece, one), np.zeros((len(piece), 3))
+    if not len(piece):
+        return target, turned
+    unloaded = replace(travel_of(job, track, piece, one), force=np.zeros((len(piece), 3)))
+    if orienting is None:
+        result = aim_at(job, target, unloaded, "newton", tips_only=True)
+    else:
+        result, turned = orienting.aim(target, unloaded, orienting.programmed(track, piece, one))
+    refuse_unsolved(program, track, piece, target, result.status)
+    if shares is None:
+        return result.commanded, turned
+    behind = np.minimum(piece + 1, len(track.motion) - 1)  # where the next piece begins, with its share
+    return shares.taken(track, behind, np.zeros(len(piece)), target, result.commanded), turned
 
 
 def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
@@ -124,6 +138,15 @@ def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
     scale = np.divide(commanded, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
     unscaled = rows.joining | ((rows.kind != LINE) & ~rows.arcs.on) | ~rows.corrected | (programmed < 0.01)
     return np.where(unscaled, feed, feed * np.clip(scale, 0.2, 5.0))
+
+
+def times_of(job: Job, program: Program, rows: CorrectedRows, s: Floats) -> Floats:
+    """Time (N,) s at end points by the programmed feed, s (N,) mm along the path; rapids take none."""
+    feed = program.path.feed[rows.motion]
+    speed = np.where(np.isnan(feed), job.config.process.feed_mm_per_min or np.nan, feed)
+    moving = (rows.kind != RAPID) & (speed > 0.0)
+    out: Floats = np.cumsum(np.where(moving, np.diff(s, prepend=0.0) / np.where(moving, speed, 1.0) * 60.0, 0.0))
+    return out
 
 
 def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Output:

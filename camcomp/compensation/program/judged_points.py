@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,8 @@ from camcomp.compensation.program.moves import WITHIN_RAPID, travel_of
 from camcomp.compensation.program.orienting import Orienting
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
+from camcomp.ground.path_geometry import between_ends
+from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_pose, respond
@@ -36,8 +40,9 @@ class JudgedPoints:
     judged: Bools  # (k,) counted in before and after: feed motions, no joining lines
     kept: Bools  # (k,) between the ends of an arc that stays as programmed
     before: Floats | None  # (3,) where the first move starts, if that is known
+    near: Any = None  # response of a machine without effects that is interpolated, around the targets
 
-    @property
+    @cached_property
     def end(self) -> Bools:
         """Which ones are end points."""
         out: Bools = self.fraction == 1.0
@@ -47,7 +52,7 @@ class JudgedPoints:
         """How far (mm) in each piece (pieces,) errors (k, 3) at the middles of lines lie off the mean of those at their ends."""
         at = np.flatnonzero((self.fraction == 0.5) & self.judged & (self.row > 0))
         end, row = np.flatnonzero(self.end), self.row[at]
-        sag = np.linalg.norm(error[at] - 0.5 * (error[end[row - 1]] + error[end[row]]), axis=1)
+        sag = sizes(error[at] - 0.5 * (error[end[row - 1]] + error[end[row]]))
         out = np.zeros(pieces)
         np.fmax.at(out, self.piece[at], sag)
         return out
@@ -55,9 +60,15 @@ class JudgedPoints:
     def along(self, ends: Floats, arcs: Arcs) -> Floats:
         """Points (k, 3) of the moves between end points (N, 3)."""
         first = ends[:1] if self.before is None else self.before[None]
-        start = np.concatenate((first, ends[:-1]))[self.row]
-        out = arcs_out.along(start, ends[self.row], arcs.take(self.row), self.axis, self.fraction)
-        return np.where(self.kept[:, None], self.target, np.where(self.end[:, None], ends[self.row], out))
+        start = np.concatenate((first, ends[:-1]))
+        out = np.empty((len(self.row), 3))
+        between_ends(start, ends, self.row, self.fraction, out)
+        on = np.flatnonzero(arcs.on[self.row] & ~self.end)
+        if len(on):
+            row = self.row[on]
+            out[on] = arcs_out.along(start[row], ends[row], arcs.take(row), self.axis[on], self.fraction[on])
+        out[self.kept] = self.target[self.kept]
+        return out
 
 
 def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -> JudgedPoints:
@@ -72,7 +83,7 @@ def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -
     row = np.concatenate((np.arange(n), inner, bent, bent, np.repeat(rapid, len(WITHIN_RAPID))))
     fraction = np.repeat([1.0, 0.5, 0.25, 0.75], [n, len(inner), len(bent), len(bent)])
     fraction = np.concatenate((fraction, np.tile(WITHIN_RAPID, len(rapid))))
-    order = np.lexsort((fraction, row))
+    order = np.argsort(row + 0.5 * fraction, kind="stable")
     row, fraction = row[order], fraction[order]
     end = fraction == 1.0
     piece = rows.piece[row]
@@ -80,12 +91,17 @@ def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -
     travel = travel_of(job, track, piece, w)
     force = np.where(end[:, None], job.frame.vectors(rows.force)[row], travel.force)  # joining lines know better
     kept = ~end & ((rows.kind == ARC) & ~rows.arcs.on)[row]
-    axis = track.path.axis[track.motion[piece]]
+    axis = np.broadcast_to(np.zeros(3), (len(piece), 3))
+    if len(bent):
+        axis = track.path.axis[track.motion[piece]]
     travel = replace(travel, force=force)
     before = track.path.start[0] if n and track.path.known[0] else None
+    target, near, answers = track.points(piece, w), None, job.real_machine.answers
+    if answers is not None and not job.causes and travel.rotation is None:
+        near = answers.near(job.frame.to_machine(target), travel.force, end)
     return JudgedPoints(
-        row=row, fraction=fraction, axis=axis, piece=piece, w=w, target=track.points(piece, w), travel=travel,
-        judged=cut[row], kept=kept, before=before,
+        row=row, fraction=fraction, axis=axis, piece=piece, w=w, target=target, travel=travel, judged=cut[row], kept=kept,
+        before=before, near=near,
     )  # fmt: skip
 
 
@@ -109,6 +125,10 @@ def see(
     """The loaded machine at commanded points (k, 3) mm, program frame; words (N, 3): of the orientation at end points."""
     if orienting is not None and words is not None:
         return _see_oriented(job, points, told, orienting, words)
+    if points.near is not None:
+        commanded = job.frame.to_machine(told)
+        state, tip = points.near.state(commanded), job.frame.to_program(points.near.tips(commanded))
+        return Seen(tip - points.target, points.near.status, tip[points.end], state)
     masses_at = points.target if job.causes else None  # masses move with the target
     tip, state = respond(job, told, points.travel, masses_at, before=points.before)
     return _seen(points, tip, state)
@@ -139,6 +159,9 @@ def _seen(points: JudgedPoints, tip: Floats, state: Correction, tilt: Floats | N
 
 def see_original(job: Job, points: JudgedPoints) -> Seen:
     """The original program through the full model, at the same points."""
+    if points.near is not None:
+        tip = job.frame.to_program(points.near.target + points.near.unloaded)
+        return Seen(tip - points.target, points.near.status, tip[points.end], points.near.programmed())
     tip, state = respond(job, points.target, points.travel, before=points.before, tips_only=True)
     return _seen(points, tip, state)
 

@@ -18,6 +18,7 @@ from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.progress import done, part
+from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.frame import lateral
 from camcomp.model.cutting.track import PLUNGE_SINE, Track, lay_track
 from camcomp.model.job import Job
@@ -71,7 +72,7 @@ def loaded_cut(job: Job, program: Program, step_mm: float = STEP_MM) -> LoadedCu
     none = np.zeros_like(way.told)
     free = tips(none)
     bends = tips(track.force(piece, w)) - free  # as if the machine were rigid
-    reach = max(FARTHER * float(np.linalg.norm(bends, axis=1).max(initial=0.0)), LEAST_REACH_MM)
+    reach = max(FARTHER * float(sizes(bends).max(initial=0.0)), LEAST_REACH_MM)
     slope = np.stack([(tips(none + PROBE_N * axis) - free) / PROBE_N for axis in np.eye(3)], axis=2)
     for turn in range(ROUNDS):
         memory = memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds)

@@ -15,6 +15,7 @@ from camcomp.compensation.program.moves import Layout
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Floats, Ints, Path
 from camcomp.ground.errors import CheckFailed
+from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 
 NEAR_MM = 5.0  # a matched end may be this far from where it is expected
@@ -150,7 +151,7 @@ def _ends(
     limit = 1.3 * max(track.length[i], reach[i]) + NEAR_MM
     run = np.cumsum(step[begin:room])
     run = run[: max(int(np.searchsorted(run, limit, side="right")), 1)]
-    off = np.linalg.norm(path.end[begin : begin + len(run)] - expected[i], axis=1)
+    off = sizes(path.end[begin : begin + len(run)] - expected[i])
     longer = np.minimum(np.abs(run - track.length[i]), np.abs(run - reach[i]))
     off += 0.1 * longer
     near = [int(k) for k in np.argsort(off, kind="stable")[:ENDS] if off[k] <= NEAR_MM + 0.1 * limit]
@@ -159,5 +160,5 @@ def _ends(
         w = np.concatenate(([0.0], run[: k + 1] / max(float(run[k]), 1e-300)))
         along = np.diff(track.points(np.full(len(w), i), w), axis=0)
         made = path.end[begin : begin + k + 1] - path.start[begin : begin + k + 1]
-        out.append((begin + k, float(np.linalg.norm(made - along, axis=1).sum()), float(longer[k])))
+        out.append((begin + k, float(sizes(made - along).sum()), float(longer[k])))
     return out

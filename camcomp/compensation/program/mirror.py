@@ -21,6 +21,7 @@ from camcomp.ground.datatypes import RAPID, Floats, Path
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.files import display_name, read_bytes
 from camcomp.ground.notes import note
+from camcomp.ground.vectors import sizes
 from camcomp.model.config.spec import ForceChoice
 from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.job import Job
@@ -92,18 +93,18 @@ def deviations(path: Path, log: str) -> DeviationField:
     """Deviations of a test cut from its program, by its log. Raises ConfigError CC400 to CC406, FileError."""
     time, tip = _measured(log)
     velocity = np.gradient(tip, time, axis=0)
-    speed = np.linalg.norm(velocity, axis=1)
+    speed = sizes(velocity)
     direction = velocity / np.maximum(speed, 1e-9)[:, None]
     places, tangents, cuts = _sampled(path)
     _, nearest = cKDTree(_keys(places, tangents)).query(_keys(tip, direction))
     off = tip - places[nearest]
     off -= np.sum(off * tangents[nearest], axis=1, keepdims=True) * tangents[nearest]
     cutting = cuts[nearest] & (speed > 0.05 * np.median(speed))
-    usable = cutting & (np.linalg.norm(off, axis=1) < OFF_MM)
+    usable = cutting & (sizes(off) < OFF_MM)
     if usable.sum() < max(LEAST_ROWS, LEAST_SHARE * cutting.sum()):
         message = f"{display_name(log)}: {usable.sum()} of {cutting.sum()} rows lie on the cuts of the program"
         raise ConfigError("CC406", message)
-    apart = float(np.median(np.linalg.norm(np.diff(tip[usable], axis=0), axis=1)))
+    apart = float(np.median(sizes(np.diff(tip[usable], axis=0))))
     return DeviationField(tip[usable] - off[usable], off[usable], max(SMOOTH_ROWS * apart, LEAST_MM))
 
 

@@ -5,7 +5,6 @@ Shared by `compensate` and `verify`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,17 +78,9 @@ def corrected_pieces(path: Path, track: Track) -> Bools:
 
 def refuse_unsolved(program: Program, track: Track, piece: Ints, target: Floats, status: Ints) -> None:
     """Raises PhysicsError for every source line with a point that could not be solved; target (k, 3) mm."""
-    raise_unsolved(track.motion[piece], target, status, lambda motion: _place(program, motion))
-
-
-def raise_unsolved(motion: Ints, target: Floats, status: Ints, place: Callable[[int], Location]) -> None:
-    """Raises PhysicsError for every source line with a point (k,) of a motion that has a status.
-
-    target (k, 3) mm: programmed tips, program frame. place: where a motion stands.
-    """
     errors: dict[int, PhysicsError] = {}
     for i in np.flatnonzero(status != 0):
-        at = place(int(motion[i]))
+        at = _place(program, int(track.motion[piece[i]]))
         if at.line not in errors:
             x, y, z = target[i]
             text = f"{STATUS.get(int(status[i]), 'no solution')} at X{x:.4f} Y{y:.4f} Z{z:.4f} (program frame, mm)"

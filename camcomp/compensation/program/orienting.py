@@ -16,6 +16,7 @@ from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Bools, Floats, Ints, Path
 from camcomp.ground.errors import ConfigError, ProgramError
 from camcomp.ground.orientation import RPY, UPRIGHT, VECTOR, between
+from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_at, respond, without_drives
@@ -117,7 +118,7 @@ class Orienting:
         loaded = np.array([exp_rotation(each) for each in state.tilt[on]]).reshape(-1, 3, 3) @ told[on]
         if self.form == VECTOR:
             one, other = loaded[:, :, 2], requested[on][:, :, 2]
-            sine = np.linalg.norm(np.cross(one, other), axis=1)
+            sine = sizes(np.cross(one, other))
             out[on] = np.arctan2(sine, np.einsum("ni,ni->n", one, other))
         else:
             out[on] = tilts(loaded, requested[on])

@@ -23,6 +23,7 @@ from camcomp.gcode.text import count_lines
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.orientation import angles_of
 from camcomp.ground.source_lines import MOST_LINES, named_lines
+from camcomp.ground.vectors import sizes
 from camcomp.model.control import waiting_s
 from camcomp.model.job import Job
 
@@ -82,9 +83,9 @@ class Totals:
             out.tilt = out.tilt_after = float(np.fmax.reduce(result.tilt_after, initial=0.0))
         return out
 
-    def add_exact(self, result: Compensated, own: Bools | slice = slice(None)) -> JointTableRows:
-        """Add rows `own` (N,) of a result that was corrected exactly."""
-        rows, state, first = result.rows, result.state, int(np.arange(len(result.s))[own][0])
+    def add_exact(self, result: Compensated, own: slice = slice(None)) -> JointTableRows:
+        """Add rows `own` of a result that was corrected exactly."""
+        rows, state, first = result.rows, result.state, own.start or 0
         s0, t0 = (result.s[first - 1], result.t[first - 1]) if first else (0.0, 0.0)
         s, t = self._s + result.s[own] - s0, self._t + result.t[own] - t0
         self._s, self._t = float(s[-1]), float(t[-1])
@@ -115,7 +116,7 @@ class Totals:
         change = np.abs(rows.joints - rows.nominal)[corrected]
         self.change = np.fmax(self.change, np.fmax.reduce(change, axis=0, initial=0.0))
         self.force = np.fmax(self.force, np.fmax.reduce(np.abs(rows.drive)[corrected], axis=0, initial=0.0))
-        self.tilt = float(np.fmax.reduce(np.linalg.norm(tilt, axis=1)[corrected], initial=self.tilt))
+        self.tilt = float(np.fmax.reduce(sizes(tilt)[corrected], initial=self.tilt))
         self.before.add(before)
         self.after.add(after)
         self.missed.add(missed)
@@ -125,7 +126,7 @@ class Totals:
                 lines = np.unique(rows.line[over])[: MOST_LINES + 1]
                 self._beyond[a] = sorted({*self._beyond[a], *lines.tolist()})[: MOST_LINES + 1]
 
-    def _columns(self, bands: Bands | None, own: Bools | slice = slice(None)) -> Floats | None:
+    def _columns(self, bands: Bands | None, own: slice = slice(None)) -> Floats | None:
         """Add the expected error of a part; return the band columns of its own rows if the table needs them."""
         if bands is None:
             return None

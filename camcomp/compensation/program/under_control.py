@@ -6,10 +6,9 @@ separately from the tip error of the written program.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,9 +18,10 @@ from camcomp.compensation.program.control_account import ControlAccount, FarOff,
 from camcomp.compensation.program.result import CycleTime
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.output import Part, Rewritten
-from camcomp.gcode.path_mode import PathMode
+from camcomp.gcode.path_mode import PathMode, numbered
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
+from camcomp.ground.vectors import sizes
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves, mode_columns, moves_of
@@ -108,13 +108,13 @@ class UnderControl:
     @property
     def at_joins(self) -> float:
         """Largest error next to joining lines, mm."""
-        size = np.linalg.norm(self.error[self.points.joined], axis=1)
+        size = sizes(self.error[self.points.joined])
         return float(np.nanmax(size, initial=0.0))
 
     @property
     def off_joins(self) -> float:
         """Largest error apart from joining lines, mm."""
-        size = np.linalg.norm(self.error[~self.points.joined], axis=1)
+        size = sizes(self.error[~self.points.joined])
         return float(np.nanmax(size, initial=0.0))
 
     def warnings(self, language: Dialect) -> list[str]:
@@ -150,9 +150,10 @@ def rests(program: Program, rows: CorrectedRows, tolerance_um: float, part: Part
     Lines that set the path mode themselves are unchanged, and so is the last end point of a part: what follows it is not
     known to begin in the mode of the program.
     """
-    modes = program.modes
-    free = np.array([rounds(mode, tolerance_um) for mode in modes], bool)
-    free[1:] &= np.array([a is b or a == b for a, b in pairwise(modes)], bool)
+    modes, which = numbered(program.modes)
+    free = np.array([rounds(mode, tolerance_um) for mode in modes], bool)[which]
+    change = np.flatnonzero(np.diff(which))
+    free[1 + change] &= np.array([modes[which[k]] == modes[which[k + 1]] for k in change], bool)
     cut = (rows.kind != RAPID) & ~rows.joining & rows.corrected
     out: Bools = rests_of(cut, rows.joining) & free[rows.motion]
     if part is not None:
@@ -165,23 +166,39 @@ def merging(mode: PathMode, language: Dialect) -> bool:
     return mode.stated and not mode.exact and mode.merge_mm > 0.0 and language.merges
 
 
-def stays_apart(program: Program, rows: CorrectedRows) -> Bools:
-    """Moves (N,) that can be kept from being made one: from the first cut that is moved on.
+def stays_apart(program: Program, rows: CorrectedRows, part: Part | None) -> Bools:
+    """Moves (N,) that can be kept from being made one: from the first cut that is moved on, in a part all.
 
     Behind every line that sets the mode itself they begin anew with the motion after it.
     """
-    modes = (program.setup.path_mode, *program.modes)
-    begins = np.array([a is not b for a, b in pairwise(modes)], bool)
-    able = np.array([merging(mode, program.language) for mode in program.modes], bool) & ~begins
+    before = program.setup.path_mode if part is None or part.first == 0 else program.modes[0]
+    modes, which = numbered((before, *program.modes))
+    begins = np.diff(which) != 0
+    able = np.array([merging(mode, program.language) for mode in modes], bool)[which[1:]] & ~begins
+    if part is not None:
+        return np.asarray(able[rows.motion])
     cut = np.zeros(len(begins), np.bool_)
-    moved = (rows.end != rows.target).any(axis=1)
-    cut[rows.motion[(rows.kind != RAPID) & moved]] = True
+    cut[rows.motion[moved_cuts(rows)]] = True
     section = np.cumsum(begins)
     first = np.full(int(section[-1]) + 1, len(begins))
     at = np.flatnonzero(cut & able)
     np.minimum.at(first, section[at], at)
     out: Bools = (able & (np.arange(len(begins)) >= first[section]))[rows.motion]
     return out
+
+
+def may_pay_apart(control: UnderControl, rows: CorrectedRows, part: Part | None, tolerance_um: float) -> bool:
+    """Whether it may pay to keep lines from being made one; in a part, whether it does."""
+    if part is None:
+        return 1e3 * control.off_joins > tolerance_um * (1.0 + 1e-9)
+    own = slice(*np.searchsorted(rows.motion, (part.first, part.last)).tolist())
+    cut = (moved_cuts(rows) & ~rows.joining)[own]
+    return bool(cut.any()) and apart_pays(control.written.take(own), cut, control.limits, tolerance_um)
+
+
+def moved_cuts(rows: CorrectedRows) -> Bools:
+    """Cuts (N,) that end elsewhere than programmed."""
+    return np.asarray((rows.kind != RAPID) & (rows.end != rows.target).any(axis=1))
 
 
 def under_control(
@@ -216,7 +233,7 @@ def under_control(
     cuts = np.flatnonzero((path.kind != RAPID) & ~path.machine)
     return UnderControl(
         programmed=programmed_moves(program, job), written=moves, limits=limits_of(job.config),
-        tolerance_mm=1e-3 * tolerance_um, modes=distinct(program.modes[k] for k in cuts), points=on_moves, rest=rest,
+        tolerance_mm=1e-3 * tolerance_um, modes=modes_of(program.modes, cuts), points=on_moves, rest=rest,
         apart=apart is not None,
     )  # fmt: skip
 
@@ -226,13 +243,20 @@ def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um
 
     def off(plan: ControlPlan) -> float:
         at = np.flatnonzero(cut)
-        return 1e3 * float(np.linalg.norm(plan.leaves_by(at, moves.end[at]), axis=1).max(initial=0.0))
+        return 1e3 * float(sizes(plan.leaves_by(at, moves.end[at])).max(initial=0.0))
 
     merged = plan_of(moves, limits)
     if off(merged) <= tolerance_um:
         return False
     free = plan_of(replace(moves, merge=np.zeros(len(moves))), limits)
     return off(free) < 0.9 * off(merged) and free.duration_s < LOST_TIME * merged.duration_s
+
+
+def modes_of(modes: Sequence[PathMode], motions: Ints) -> tuple[PathMode, ...]:
+    """The modes of some motions, in the order in which they come."""
+    known, which = numbered(modes)
+    first = np.unique(which[motions], return_index=True)[1]
+    return distinct(known[which[motions[k]]] for k in np.sort(first))
 
 
 def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:
@@ -290,7 +314,7 @@ def of_text(
         for account, each in zip(accounts, (original, corrected), strict=True)
     )
     path = original.path
-    modes = distinct(original.modes[k] for k in np.flatnonzero((path.kind != RAPID) & ~path.machine))
+    modes = modes_of(original.modes, np.flatnonzero((path.kind != RAPID) & ~path.machine))
     return {
         "cycle_time_s": CycleTime(before=before, after=after),
         "control_mode": mode_name(modes),

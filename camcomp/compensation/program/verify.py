@@ -33,6 +33,7 @@ from camcomp.gcode.stamp import is_stamped, stamped_model
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 from camcomp.ground.progress import part, steps
+from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_at, respond
@@ -87,7 +88,7 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     track, shares = asked.track, asked.shares
     with part(0.0, 0.3, points=True):
         begin, expected = asked.commanded(0.0), asked.commanded(1.0)
-    step = np.linalg.norm(begin - np.concatenate((original.path.start[:1], expected[:-1])), axis=1)
+    step = sizes(begin - np.concatenate((original.path.start[:1], expected[:-1])))
     layout = row_layout(original.path, track, step, original.step_mm(job.config.control.resolution_mm))
     reach, foreign = asked.reach(), _other_model(corrected, job)
     first, last, joins = match_moves(
@@ -186,7 +187,7 @@ class _Programmed:
         points = track.points(nodes.piece, nodes.w)
         on = corrected[nodes.piece]
         points[on] = self.aimed(nodes.piece[on], nodes.w[on]).commanded
-        step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        step = sizes(np.diff(points, axis=0))
         inside = np.diff(nodes.piece) == 0
         return np.bincount(nodes.piece[1:][inside], step[inside], len(corrected)).astype(np.float64)
 
@@ -241,7 +242,7 @@ class _Points:
         w = np.linspace(0.0, 1.0, ALONG + 1)
         aimed = self.asked.aimed(np.repeat(uneven, len(w)), np.tile(w, len(uneven))).commanded
         for i, curve in zip(uneven, aimed.reshape(-1, len(w), 3), strict=True):
-            way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))))
+            way = np.concatenate(([0.0], np.cumsum(sizes(np.diff(curve, axis=0)))))
             on = piece == i
             share[on] = np.interp(share[on] * way[-1], way, w)
         return np.asarray(share)
@@ -254,7 +255,7 @@ class _Points:
             """Distance from the place, and how far the tip lies ahead of it, mm."""
             gap = self.gap(w)
             tangent = path_geometry.tangents(track.path, track.motion[piece], track.u(piece, w))
-            return np.linalg.norm(gap, axis=1), np.sum(gap * tangent, axis=1)
+            return sizes(gap), np.sum(gap * tangent, axis=1)
 
         # With the place the force turns, and the tip with the force; on small arcs further than the place, so by secant.
         last_w = np.where(w < 0.5, w + PROBE_MM, w - PROBE_MM)
@@ -282,10 +283,10 @@ class _Points:
         assert shares is not None
         from_path = beside + shares.left(job, self.asked.track, self.piece, w, travel)
         off = aim_at(job, target, travel, "newton").commanded - target
-        size = np.maximum(np.linalg.norm(off, axis=1), 1e-12)
+        size = np.maximum(sizes(off), 1e-12)
         along = np.einsum("ni,ni->n", beside, off) / size
         along = np.clip(along, -ALLOWED_SHARE * size, ALLOWED_SHARE * size)
-        return np.linalg.norm(from_path, axis=1), np.linalg.norm(beside - (along / size)[:, None] * off, axis=1)
+        return sizes(from_path), sizes(beside - (along / size)[:, None] * off)
 
     def expected_error(self, w: Floats, end: Bools) -> BandTotals:
         """What machines that may be leave at the ends (k,) of moves; the other points are only there because drives remember."""
@@ -308,7 +309,7 @@ class _Points:
         target, travel = track.points(piece[vertex], w[vertex]), travel_of(job, track, piece[vertex], w[vertex])
         # solver error: model tip of the exact command of the nearest point, minus that point
         tip, _ = respond(job, aim_at(job, target, travel, "newton").commanded, travel)
-        convergence = np.linalg.norm(tip - target, axis=1)
+        convergence = sizes(tip - target)
         line = program.path.line[track.motion[piece]]
         rounding = 0.5 * np.sqrt(3.0) * 1e3 * program.step_mm(job.config.control.resolution_mm)
         out = []

@@ -12,6 +12,7 @@ from camcomp.compensation.program.trajectories import Trajectories
 from camcomp.compensation.program.under_control import mode_name
 from camcomp.compensation.program.verify import Verified
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
+from camcomp.ground.vectors import sizes
 from camcomp.model.job import Job
 from camcomp.report.plot import (
     BAR_MARGIN,
@@ -61,7 +62,7 @@ def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
 
     def largest(error: Floats, row: Ints) -> Floats:
         out = np.zeros(len(rows.w))
-        np.fmax.at(out, row, 1e3 * np.linalg.norm(error, axis=1))
+        np.fmax.at(out, row, 1e3 * sizes(error))
         return out
 
     drive_scale = np.where(job.machine.revolute, 1e-3, 1.0)
@@ -93,7 +94,7 @@ def figure_trajectories(result: Compensated, found: Trajectories) -> Figure:
     traces[0]["line"] = {"color": INK, "dash": "solid", "width": 2}
     base = {a: gapped(target[:, i], index, gap) for i, a in enumerate(AXES)}
     shifts = [{a: gapped((points - target)[:, i], index, gap, 6) for i, a in enumerate(AXES)} for _, points in named]
-    off = [1e3 * float(np.nanmax(np.linalg.norm(points - target, axis=1)[~hidden], initial=0.0)) for _, points in named]
+    off = [1e3 * float(np.nanmax(sizes(points - target)[~hidden], initial=0.0)) for _, points in named]
     cutting = ~hidden & rows.force.any(axis=1)
     drawn = target[cutting] if cutting.any() else target[~hidden]
     extent = float(np.ptp(drawn, axis=0).max())
@@ -156,7 +157,7 @@ def figure_error(drawn: DrawnPath, tolerance_um: float) -> Figure:
 
 def figure_shift(drawn: DrawnPath) -> Figure:
     """Commanded minus programmed tip along the path."""
-    size = np.linalg.norm(drawn.shift, axis=1)
+    size = sizes(drawn.shift)
     index, gap = broken(thin(drawn.shift), drawn.hidden)
     s = gapped(drawn.s, index, gap, 4)
     curves = [line(f"Δ{a}", s, gapped(drawn.shift[:, i], index, gap, 3), i) for i, a in enumerate(AXES)]
@@ -204,7 +205,7 @@ def _actuators(drawn: DrawnPath, names: tuple[str, ...], which: Ints, rotary: bo
 
 def figure_path(drawn: DrawnPath) -> Figure:
     """The tool path in space, coloured by the size of the correction."""
-    size = np.linalg.norm(drawn.shift, axis=1)
+    size = sizes(drawn.shift)
     index, gap = broken(thin(np.column_stack((drawn.target, size))), drawn.hidden)
     x, y, z = (gapped(drawn.target[:, i], index, gap, 4) for i in range(3))
     bar = {"title": {"text": "correction<br>in µm"}, "thickness": 14, "len": 0.8}

@@ -27,6 +27,7 @@ from camcomp.compensation.report.machine_drawing import figure_machine
 from camcomp.compensation.report.wall_drawing import wall_section
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.vectors import sizes
 from camcomp.model.config.in_force import values_in_force
 from camcomp.model.control import setup_of
 from camcomp.model.job import Job
@@ -174,7 +175,7 @@ def _plots(result: Compensated, job: Job, drawn: DrawnPath, checked: Verified, t
 def _lines(drawn: DrawnPath, job: Job, checked: Verified) -> Table:
     """Largest values per source line; of long programs those with the largest corrections."""
     left = {each.line: each for each in checked.lines}
-    size = np.linalg.norm(drawn.shift, axis=1)
+    size = sizes(drawn.shift)
     shown = ~drawn.hidden
     numbers = np.unique(drawn.line[shown])
     if len(numbers) > MOST_LINES:

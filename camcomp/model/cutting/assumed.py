@@ -15,6 +15,7 @@ import numpy as np
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
 from camcomp.ground.source_lines import named_lines
+from camcomp.ground.vectors import sizes
 from camcomp.model.config.cutting_tool import Cutter
 from camcomp.model.config.spec import Config
 from camcomp.model.cutting.track import PLUNGE_SINE
@@ -188,7 +189,7 @@ class Passes:
             near, far = (share * each for share in STEP_OVER_DIAMETERS)
             pairs = of[cKDTree(self.point[of]).query_pairs(far, output_type="ndarray")]
             first, later = pairs.min(axis=1), pairs.max(axis=1)
-            apart = np.linalg.norm(self.point[first] - self.point[later], axis=1)
+            apart = sizes(self.point[first] - self.point[later])
             own = (self.diameter[later] == each) & (apart > near)
             beside[later[own & (self.along[later] - self.along[first] > 3.0 / SAMPLE_DIAMETERS)]] = True
         return float(self.diameter[beside].sum() / self.diameter.sum())

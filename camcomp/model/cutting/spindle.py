@@ -4,14 +4,16 @@ import numpy as np
 
 from camcomp.ground.datatypes import Ints
 from camcomp.ground.source_lines import named_lines
-from camcomp.model.cutting.track import NO_FORCE, Track
+from camcomp.ground.vectors import sizes
+from camcomp.model.cutting.corners import NO_FORCE
+from camcomp.model.cutting.track import Track
 
 
 def cut_without_spindle(track: Track) -> Ints:
     """Source lines, ascending, along which the model cuts while the program has stopped the spindle."""
     still = np.flatnonzero(track.cutting & (track.path.turn[track.motion] == 0.0))
     force = track.force(still, np.full(len(still), 0.5))
-    return np.unique(track.path.line[track.motion[still[np.linalg.norm(force, axis=1) > NO_FORCE]]])
+    return np.unique(track.path.line[track.motion[still[sizes(force) > NO_FORCE]]])
 
 
 def spindle_warning(lines: Ints) -> list[str]:

@@ -12,12 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.vectors import sizes
+from camcomp.model.cutting.corners import find_corners, share_loads
 from camcomp.model.cutting.cut import Cut
 from camcomp.model.cutting.engaged import Engage, Engaged, EngagementArcs
 from camcomp.model.cutting.frame import lateral, to_vector
@@ -29,8 +32,6 @@ JOIN_ANGLE = np.radians(5.0)
 PLUNGE_SINE = (
     5e-3  # of the angle between feed and tool axis: corrected plunges slant by some 1e-4, rounded short ones too
 )
-NO_FORCE = 1e-9  # N
-SAME_FORCE = 1e-6  # of the force: lengths of the path are rounded sums, and a table is looked up by them
 
 
 class Edges(NamedTuple):
@@ -49,6 +50,7 @@ class Conditions:
 
     model: Callable[[Cut], Floats] | None
     plunges: bool = False
+    steady: bool = False  # the force depends on the cut alone, not on how far along the path it is
     tool_axis: Floats = (0.0, 0.0, 1.0)  # type: ignore[assignment]  # program frame, away from the workpiece
     stock_top_mm: float | None = None
     depth_mm: float | None = None
@@ -84,6 +86,9 @@ class Track:
     corner: Bools  # the tip cannot pass the start of the piece without a stop
     beside0: Floats  # fraction of the motion after the start of the piece at which its direction is taken
     beside1: Floats  # fraction of the motion before its end at which its direction is taken
+    own0: Floats  # (p, 3) N, the model's force at the start of the piece, program frame
+    own1: Floats  # (p, 3) N, at its end
+    even: Bools  # (p,) between its ends the model's force is linear
     load: PieceLoad | None = None  # if the stock is known
     engaged: Engaged | None = None  # if the stock is known
     began_min: float = 0.0  # minutes that the program takes before this path, when it is a part of one
@@ -118,21 +123,31 @@ class Track:
         of, begin = of[order], begin[order]
         end = np.where(np.append(of[1:] == of[:-1], False), np.append(begin[1:], 1.0), 1.0)
         inner = begin > 0.0
-        a, b = self.fade0[of], self.fade1[of]
+        a, b, c, d = self.fade0[of], self.fade1[of], self.own0[of], self.own1[of]
         return replace(
             self, motion=self.motion[of], u0=self.u(of, begin), u1=self.u(of, end), cutting=self.cutting[of],
             length=(end - begin) * self.length[of], s0=self.s0[of] + begin * self.length[of],
             fade0=a + begin[:, None] * (b - a), fade1=a + end[:, None] * (b - a), jump=self.jump[of] & ~inner,
             corner=self.corner[of] & ~inner, beside0=np.where(inner, 0.0, self.beside0[of]),
-            beside1=np.where(end < 1.0, 0.0, self.beside1[of]),
+            beside1=np.where(end < 1.0, 0.0, self.beside1[of]), own0=c + begin[:, None] * (d - c),
+            own1=c + end[:, None] * (d - c), even=self.even[of],
             load=None if self.load is None else self.load.cut(of, begin, end),
         )  # fmt: skip
 
     def force(self, piece: Ints, w: Floats, feed: Floats | None = None) -> Floats:
         """Cutting force on the tool (k, 3) N, program frame; feed (k,) mm/min as driven, else the program's."""
+        if feed is None and self.even[piece].all():
+            first, last = self._ends
+            return np.asarray(first[piece] + w[:, None] * last[piece])
         tangent = path_geometry.tangents(self.path, self.motion[piece], _beside(self, piece, w))
         out = self.force_along(piece, w, tangent, feed)
         return out + (1.0 - w)[:, None] * self.fade0[piece] + w[:, None] * self.fade1[piece]
+
+    @cached_property
+    def _ends(self) -> tuple[Floats, Floats]:
+        """Force (p, 3) N at the start of every piece, and by how much it differs at its end."""
+        first = self.own0 + self.fade0
+        return first, self.own1 + self.fade1 - first
 
     def sizes(self, piece: Ints, w: Floats) -> tuple[Floats, Floats]:
         """Depth of the cut (k,) mm and sum of the engagement arcs (k,) rad, NaN if the stock is unknown."""
@@ -183,7 +198,7 @@ class Track:
         """Cutting force (k, 3) N at driven feeds (k,): linear between the model's forces at the places on both sides."""
         assert self.engaged is not None
         out = np.zeros((len(piece), 3))
-        on = np.flatnonzero(self.cutting[piece] & (np.linalg.norm(direction, axis=1) > 0.0))
+        on = np.flatnonzero(self.cutting[piece] & (sizes(direction) > 0.0))
         motion, u = self.motion[piece[on]], self.u(piece[on], w[on])
         left, right, share = self.engaged.between(motion, u, w[on] == 0.0)
         seen = _in_tool_frame(self.path, motion, u, direction[on])
@@ -231,7 +246,7 @@ def _force(
     rotation of the tool from the axis of the conditions. The model sees the feed in the frame of the tool.
     """
     out = np.zeros((len(piece), 3))
-    on = cutting[piece] & (np.linalg.norm(direction, axis=1) > 0.0)
+    on = cutting[piece] & (sizes(direction) > 0.0)
     if c.model is None or not on.any():
         return out
     seen = direction if turned is None else np.einsum("kji,kj->ki", turned, direction)
@@ -346,7 +361,7 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
         sine = np.maximum(sine, _sine(path, motion, middle, path_geometry.tangents(path, motion, middle), axis))
     piece_length = length[motion] * (u1 - u0)
     cutting = feeding & (piece_length > 0.0) & ((sine > PLUNGE_SINE) | conditions.plunges)
-    load = None
+    load, none = None, np.zeros((len(motion), 3))
     if places is not None:
         load = PieceLoad.of(places, base, motion, u0, u1)
         cutting &= load.on | (sine <= PLUNGE_SINE)
@@ -355,7 +370,7 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
     track = Track(
         path=path, conditions=conditions, motion=motion, u0=u0, u1=u1, cutting=cutting, length=piece_length,
         s0=np.concatenate(([0.0], np.cumsum(length)))[motion] + length[motion] * u0,
-        fade0=np.zeros((len(motion), 3)), fade1=np.zeros((len(motion), 3)), jump=np.zeros(len(motion), np.bool_),
+        fade0=none, fade1=none, own0=none, own1=none, jump=np.zeros(len(motion), np.bool_), even=np.zeros(len(motion), np.bool_),
         corner=np.ones(len(motion), np.bool_), beside0=beside0, beside1=beside1, load=load, engaged=engaged,
     )  # fmt: skip
     return _cut_at_swings(_with_corners(track, first, last, over), upright)
@@ -390,32 +405,50 @@ def _with_corners(track: Track, first: Floats, last: Floats, over: Bools) -> Tra
 
     over (p,): the direction across the tool reverses at the start of the piece.
     """
-    cutting, n = track.cutting, len(track.motion)
-    every = np.arange(n)
-    own0, own1 = _end_force(track, every, np.zeros(n), first), _end_force(track, every, np.ones(n), last)
-    fade0, fade1 = np.zeros((n, 3)), np.zeros((n, 3))
-    jump = np.zeros(n, np.bool_)
-    rapid = track.path.kind[track.motion] == RAPID
-    real = np.flatnonzero((track.length > 0.0) | rapid)
-    a, b = real[:-1], real[1:]
-    cosine = np.clip(np.sum(last[a] * first[b], axis=1), -1.0, 1.0)
-    straight_on = ~rapid[a] & ~rapid[b] & (cosine >= np.cos(JOIN_ANGLE))
-    corner = np.ones(n, np.bool_)
-    corner[b] = ~straight_on
-    smooth = cutting[a] & cutting[b] & straight_on & ~over[b]
-    bisector = np.where(smooth[:, None], last[a] + first[b], 0.0)
-    bisector /= np.maximum(np.linalg.norm(bisector, axis=1, keepdims=True), 1e-300)
-    ahead, behind = _end_force(track, a, np.ones(len(a)), bisector), _end_force(track, b, np.zeros(len(b)), bisector)
-    smooth &= np.linalg.norm(behind - ahead, axis=1) <= SAME_FORCE * np.linalg.norm(ahead, axis=1) + NO_FORCE
-    jump[b] = ~smooth & (np.linalg.norm(own0[b] - own1[a], axis=1) > NO_FORCE)
-    if len(real) and real[0] > 0:  # moves without length before the first cut
-        jump[real[0]] = bool(np.linalg.norm(own0[real[0]]) > NO_FORCE)
-    a, b = a[smooth], b[smooth]
-    shared = 0.5 * (ahead + behind)[smooth]
-    fade1[a] = shared - own1[a]
-    fade0[b] = shared - own0[b]
-    _carry_over((track.length > 0.0) | rapid, own1 + fade1, fade0, fade1)
-    return replace(track, fade0=fade0, fade1=fade1, jump=jump, corner=corner)
+    n, rapid = len(track.motion), track.path.kind[track.motion] == RAPID
+    own0, own1, even = _own_forces(track, first, last)
+    before, bisector = np.empty(n, np.int64), np.empty((n, 3))
+    corner, smooth, jump = np.empty((3, n), np.bool_)
+    pieces = rapid, track.length
+    find_corners(*pieces, track.cutting, over, first, last, np.cos(JOIN_ANGLE), before, corner, smooth, bisector)
+    b = np.flatnonzero(smooth)
+    a = before[b]
+    ahead, fade0, fade1 = np.zeros((n, 3)), np.empty((n, 3)), np.empty((n, 3))
+    ahead[b] = _end_force(track, a, np.ones(len(a)), bisector[b])
+    behind, other = ahead.copy(), b[_differ(track, a, b)]
+    behind[other] = _end_force(track, other, np.zeros(len(other)), bisector[other])
+    share_loads(*pieces, before, smooth, own0, own1, ahead, behind, fade0, fade1, jump)
+    return replace(track, own0=own0, own1=own1, even=even, fade0=fade0, fade1=fade1, jump=jump, corner=corner)
+
+
+def _own_forces(track: Track, first: Floats, last: Floats) -> tuple[Floats, Floats, Bools]:
+    """Model force (p, 3) N at both ends of pieces for directions (p, 3) there, and where it is linear between them."""
+    c, n, path = track.conditions, len(track.motion), track.path
+    every, straight = np.arange(n), path.kind[track.motion] != ARC
+    own0 = _end_force(track, every, np.zeros(n), first)
+    if path.orientation is not None or c.plunges:
+        return own0, _end_force(track, every, np.ones(n), last), ~track.cutting
+    if track.load is not None:  # linear between places of the engagement
+        return own0, _end_force(track, every, np.ones(n), last), straight | ~track.cutting
+    level = c.depth_mm is not None or c.stock_top_mm is None
+    if c.steady and level and straight.all():
+        return own0, own0, straight
+    even = straight & c.steady
+    if not level:
+        even &= path.start[track.motion, 2] == path.end[track.motion, 2]
+    return own0, _end_force(track, every, np.ones(n), last), even | ~track.cutting
+
+
+def _differ(track: Track, a: Ints, b: Ints) -> Bools:
+    """Whether the end of pieces a (k,) and the start of pieces b (k,) may have different forces in one direction."""
+    path, c = track.path, track.conditions
+    if not (c.steady and track.load is None and (c.depth_mm is not None or c.stock_top_mm is None)):
+        return np.ones(len(a), np.bool_)
+    out, first, second = np.zeros(len(a), np.bool_), track.motion[a], track.motion[b]
+    for each in (path.feed, path.speed, path.turn, path.tool):
+        if (each != each[:1]).any():
+            out |= each[first] != each[second]
+    return out
 
 
 def _cut_at_swings(track: Track, upright: Verticals) -> Track:
@@ -426,13 +459,6 @@ def _cut_at_swings(track: Track, upright: Verticals) -> Track:
     w = (u - u0) / (u1 - u0)
     inner = (w > 1e-6) & (w < 1.0 - 1e-6)
     return track.cut(piece[inner], w[inner]) if inner.any() else track
-
-
-def _carry_over(moves: Bools, end_force: Floats, fade0: Floats, fade1: Floats) -> None:
-    """Give feed motions without length the force of the piece before them."""
-    before = np.maximum.accumulate(np.where(moves, np.arange(len(moves)), -1))
-    still = np.flatnonzero(~moves & (before >= 0))
-    fade0[still] = fade1[still] = end_force[before[still]]
 
 
 def _beside(track: Track, piece: Ints, w: Floats) -> Floats:

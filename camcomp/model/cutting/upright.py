@@ -42,6 +42,8 @@ class Verticals:
     @classmethod
     def of(cls, path: Path, tool_axis: Floats) -> Verticals:
         """All positions of a path."""
+        if not (path.kind == ARC).any():
+            return cls.none()
         tool = np.asarray(tool_axis, float)
         arcs = np.flatnonzero((path.kind == ARC) & (np.abs(path.axis @ tool) < 1e-3) & path.known & ~path.machine)
         axis, angle = path.axis[arcs], path.angle[arcs]

@@ -192,9 +192,12 @@ def _finite(job: Job, tip: Floats, state: Correction) -> tuple[Floats, Correctio
     return tip, state
 
 
-def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
-    """Commands that bring the loaded tips to the targets (n, 3); `commanded` of the result is in the program frame."""
-    found = without_drives(job, target, travel, method)
+def aim_at(job: Job, target: Floats, travel: Travel, method: str, *, tips_only: bool = False) -> Correction:
+    """Commands that bring the loaded tips to the targets (n, 3); `commanded` of the result is in the program frame.
+
+    tips_only: only `commanded` and `status` of the result are used.
+    """
+    found = without_drives(job, target, travel, method, tips_only=tips_only and not job.causes)
     commanded = job.frame.to_program(found.commanded)
     if job.causes and method != "linear":
         commanded = commanded + _through_play(job, found, travel)
@@ -270,19 +273,21 @@ def _rates(job: Job, tip: Floats) -> Floats:
     return np.stack([(a - b) / step for (a, b), step in zip(out, steps, strict=True)], axis=2)
 
 
-def acting_force(job: Job, rho: Floats, travel: Travel) -> Floats:
-    """Force (n, 3) N on the tool at set-points rho (n, m), machine frame, with the effects on the force."""
+def acting_force(job: Job, rho: Floats, travel: Travel, at: Bools) -> Floats:
+    """Force (n, 3) N on the tool at set-points rho (n, m), machine frame, with the effects on the force, at some points."""
     if not signal_path.acting(job.causes, "process"):
-        return travel.force
+        return travel.force[at]
+    travel = travel.take(at)
     return signal_path.loaded(job.causes, _motion(job, rho, travel), travel.force).force
 
 
 def without_drives(
-    job: Job, target: Floats, travel: Travel, method: str = "newton", *, pose: bool = False
+    job: Job, target: Floats, travel: Travel, method: str = "newton", *, pose: bool = False, tips_only: bool = False
 ) -> Correction:
     """Commands, machine frame, that bring the loaded tips to the targets (n, 3) for drives without errors.
 
     pose: also the platform to the orientation of the travel; `rotation` of the result is then the commanded one.
+    tips_only: only the commanded tips and the status of the result are used.
     `rho` of the result is the required position of the carriages, whatever the errors of the drives.
     """
     load = Load(travel.force, np.zeros((len(target), 6)))
@@ -291,7 +296,9 @@ def without_drives(
         nominal = _set_points(job, told, travel)
         load = signal_path.loaded(job.causes, _motion(job, nominal, travel), travel.force)
     aim = job.frame.to_machine(target)
-    return correct(job.real_machine, aim, load.force, load.wrench, method, pose=pose, rotation=travel.rotation)
+    return correct(
+        job.real_machine, aim, load.force, load.wrench, method, pose=pose, rotation=travel.rotation, tips_only=tips_only
+    )
 
 
 def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:

@@ -110,7 +110,8 @@ def solve(
 
     near (n, 3): a tip position near the answer (its nominal joint coordinates start the solver). force (n, 3) at the
     tip, wrench (n, 6) at the platform reference. rho (n, m) commanded in FREE, HOLD and CLAMP; default: the set-points of
-    `near`. check: verify stability. tips_only: drive and tilt of the result are not used.
+    `near`. check: verify stability. tips_only: drive and tilt of the result are not used,
+    in TARGET nothing but its commanded tips and its status.
     """
     n, m = len(near), len(machine.actuators)
     able = aim is None and aim_rotation is None and check and not keep and (wrench is None or not np.any(wrench))

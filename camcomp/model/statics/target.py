@@ -65,6 +65,7 @@ def correct(
     *,
     pose: bool = False,
     rotation: Array | None = None,
+    tips_only: bool = False,
 ) -> Correction:
     """Commanded tips t0F with F = f(t0 | t0F) at every point.
 
@@ -72,10 +73,12 @@ def correct(
     method: newton = eq. (3), stiffness = eq. (4), fixed-point = eq. (5), linear = one step with the unloaded Cartesian
     compliance (baseline, no iteration). pose (newton, machines with six actuators): the orientation is corrected too, not
     only the tip. rotation (n, 3, 3): requested orientation of the platform, and without pose the commanded one; None: the
-    one that the machine holds. Raises ValueError for an unknown method.
+    one that the machine holds. tips_only: only `commanded` and `status` of the result are used. Raises ValueError for an
+    unknown method.
     """
     if method == "newton":
-        state = solve(machine, POSE if pose else TARGET, aim, aim_rotation=rotation, force=force, wrench=wrench)
+        mode = POSE if pose else TARGET
+        state = solve(machine, mode, aim, aim_rotation=rotation, force=force, wrench=wrench, tips_only=tips_only)
         return Correction.of(replace(state, status=_why(machine, state)), state.passes)
     if rotation is not None:
         raise ValueError("only the method newton knows orientations")

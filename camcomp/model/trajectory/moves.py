@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from camcomp.gcode.path_mode import PathMode
+from camcomp.gcode.path_mode import PathMode, numbered
 from camcomp.ground.datatypes import Bools, Floats, Ints, Path
 
 
@@ -108,8 +108,7 @@ def line_moves(
 
 def mode_columns(modes: Sequence[PathMode]) -> tuple[Bools, Bools, Floats, Floats]:
     """Columns exact, stop, tolerance (mm) and merge (mm) (n,) of ToolMoves for path modes (n,)."""
-    known = {id(each): each for each in modes}  # few objects; to compare all of them takes longer
-    _, which = np.unique(np.fromiter(map(id, modes), np.int64, len(modes)), return_inverse=True)
-    table = [(each.exact, each.code == 611, each.tolerance_mm, each.merge_mm) for _, each in sorted(known.items())]
+    known, which = numbered(modes)
+    table = [(each.exact, each.code == 611, each.tolerance_mm, each.merge_mm) for each in known]
     columns = np.array(table, float).reshape(-1, 4)[which]
     return columns[:, 0] > 0.0, columns[:, 1] > 0.0, columns[:, 2].copy(), columns[:, 3].copy()

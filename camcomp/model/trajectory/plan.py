@@ -12,6 +12,7 @@ import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
+from camcomp.ground.vectors import sizes
 from camcomp.model.trajectory.corners import CYCLES, corners, nearest
 from camcomp.model.trajectory.merging import straight
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves
@@ -71,7 +72,7 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
         leave[at], arrive[at] = (path_geometry.tangents(path, every, zeros + u) for u in (0.0, 1.0))
         nominal[at], most[at], axis[at], angle[at] = path_geometry.lengths(path), 1.0, path.axis, np.abs(path.angle)
         middle[at] = path.centre
-        radius[at] = np.linalg.norm(path.start - path.centre, axis=1)
+        radius[at] = sizes(path.start - path.centre)
     acceleration = limits.acceleration * most
     fast, reachable = _speeds(kind=kind, feed=feed, nominal=nominal, radius=radius, most=most, limits=limits)
     way, centre = np.zeros(m, np.int64), np.zeros((m, 3))

@@ -25,16 +25,13 @@ def scanned(
     unit=1.0,
     offset=(0.0, 0.0, 0.0),
     pointed=False,
-    top=np.nan,
     last=True,
 ):
     """(motions, rows, index, reason, code, feed, ...) and the arrays of a scan."""
     data = np.frombuffer(text.encode("latin-1"), np.uint8)
     room = LinearMotions.room(1000)
     place = np.array(position)
-    found = scan(
-        data, 0, len(data), last, code, feed, False, False, place, unit, np.array(offset), pointed, top, room, 1000
-    )
+    found = scan(data, 0, len(data), last, code, feed, False, False, place, unit, np.array(offset), pointed, room, 1000)
     return found, room.take(0, found[0])
 
 
@@ -105,10 +102,6 @@ def test_numbers_without_a_point_can_be_odd():
     assert scanned("X1.\nX0\nX5\n", pointed=True)[0][:4] == (2, 2, 7, NOT_LINEAR)
 
 
-def test_a_cut_across_the_top_of_the_stock_is_odd():
-    assert scanned("G1 X2\nG0 Z-1\nG1 X3\nZ2\n", top=1.5)[0][:4] == (3, 3, 19, NOT_LINEAR)
-
-
 @pytest.mark.parametrize("cut", range(1, 12))
 def test_a_line_cut_off_by_the_buffer_is_left_for_the_next_one(cut):
     text = "G1 X2\nX3.25 Y4"
@@ -173,12 +166,10 @@ def test_lines_are_written_as_the_writer_of_whole_programs_writes_them(seed):
     path = whole.path
     motion, end, joining, feed = random_output(rng, path, 1)
     kind = np.where(path.kind[motion] == RAPID, RAPID, LINE)
-    rest = rng.random(len(motion)) < rng.choice([0.0, 0.2])
-    modes = [np.frombuffer(each, np.uint8) for each in (b"G61", b"G64")]
     one = Output(
         motion=np.append(0, motion), kind=np.append(RAPID, kind), end=np.vstack((path.end[:1], end)),
         centre=np.full((len(end) + 1, 3), np.nan), angle=np.zeros(len(end) + 1), feed=np.append(np.nan, feed),
-        joining=np.append(False, joining), rest=np.append(False, rest),
+        joining=np.append(False, joining),
     )  # fmt: skip
     expected = rewrite(whole, one, resolution_mm=RESOLUTION, version="1")
 
@@ -191,7 +182,7 @@ def test_lines_are_written_as_the_writer_of_whole_programs_writes_them(seed):
     position, state = np.array([1.0, 2.0, 3.0]), np.array([0.0, 500.0])
     size = write_rows(
         data, 0, len(data), read.line, read.begin, read.finish, read.kind, read.end, read.code_stated, read.feed_stated,
-        read.feed, first, joining, rest, 0, *modes, end, feed, position, state, 1.0, np.zeros(3), decimals(RESOLUTION, 1.0),
+        read.feed, first, joining, end, feed, position, state, 1.0, np.zeros(3), decimals(RESOLUTION, 1.0),
         0.5 * RESOLUTION * (1 + 1e-9), False, out, written, held,
     )  # fmt: skip
     text_out = out[:size].tobytes().decode()
