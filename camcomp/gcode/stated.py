@@ -14,7 +14,8 @@ from typing import Any, BinaryIO
 
 from camcomp.ground import shelf
 
-CHUNK = 1 << 22  # bytes read at once
+CHUNK = 1 << 16  # bytes read at once
+MOVES = b"0123456789.+-XYZGFN \r\n\t"  # characters of linear moves
 NEAR_LINES, NEAR_BYTES = (
     4,
     400,
@@ -171,10 +172,11 @@ class StatedError(ValueError):
 def _is_marked(source: BinaryIO, marks: Sequence[bytes]) -> bool:
     """Whether any mark (capitals) occurs in the source in any case; the source is reset to its start."""
     longest, rest = max(map(len, marks)), b""
+    worded = all(mark.translate(None, MOVES) for mark in marks)
     try:
         while block := source.read(CHUNK):
-            seen = (rest + block).upper()
-            if any(mark in seen for mark in marks):
+            seen = rest + block
+            if (seen.translate(None, MOVES) or not worded) and any(mark in seen.upper() for mark in marks):
                 return True
             rest = block[-longest:]
         return False
