@@ -1,6 +1,6 @@
 """When something acted for a while: the interval of one run in which its columns explain most of a leftover.
 
-The gain of every interval between blocks of rows comes from running sums; the best is refined row by row. Intervals that are
+The best interval between blocks of rows (model/window) is refined row by row. Intervals that are
 not far beyond what chance makes of so many are none.
 """
 
@@ -11,11 +11,11 @@ from math import comb
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
+from camcomp.diagnosis.model.window import LONGEST, best_window
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 
 LEAST_GAIN = 60.0  # chi-square of one interval; the best of 1e5 by chance is 20
-LONGEST = 0.5  # of a run: what acts for longer is no disturbance
 LEAST_ROWS = 5
 _BLOCKS = 60
 _JUMPS = 5  # of a leftover, between which an interval is tried
@@ -45,22 +45,16 @@ def likely_intervals(
     start, end = (each.name for each in candidate.shapes)
     best: tuple[float, list[tuple[float, float]]] = (LEAST_GAIN, [])
     for k, run in enumerate(bench.runs):
-        columns = always[k][:, np.arange(always[k].width)]
         order = np.argsort(places(k), kind="stable")
         at = run.run_path.started + run.run_path.time[0] + places(k)[order] * np.ptp(run.run_path.time)
-        instants, rows = np.unique(at, return_inverse=True)
+        instants, starts = np.unique(at, return_index=True)
         if len(instants) < 4 * LEAST_ROWS:
             continue
-        d = columns.shape[1]
-        hits, size = np.zeros((len(instants) + 1, d)), np.zeros((len(instants) + 1, d, d))
-        for a in range(d):
-            hits[1:, a] = np.cumsum(np.bincount(rows, (columns[:, a] * rest[k])[order]))
-            for b in range(d):
-                size[1:, a, b] = np.cumsum(np.bincount(rows, (columns[:, a] * columns[:, b])[order]))
-        gain, i, j = _best(hits, size, len(instants))
+        columns = always[k][:, np.arange(always[k].width)][order]
+        gain, i, j = max(_best(column, rest[k][order], starts) for column in columns.T)
         if gain > best[0]:
             rise = getattr(candidate.effect, "RISE_S", 0.0)
-            jumps = _jumps(np.asarray(np.bincount(rows, (rest[k] ** 2)[order]), np.float64))
+            jumps = _jumps(np.add.reduceat(rest[k][order] ** 2, starts))
             pairs = [(i, j), *(pair for pair in combinations(sorted({i, j, *jumps}), 2) if pair != (i, j))]
             fair = [(i, j) for i, j in pairs if LEAST_ROWS <= j - i <= LONGEST * len(instants)]
             best = gain, [_between(instants, i, j, rise) for i, j in fair]
@@ -85,25 +79,16 @@ def _jumps(energy: Floats) -> list[int]:
     return out
 
 
-def _best(hits: Floats, size: Floats, n: int) -> tuple[float, int, int]:
-    """Gain, first instant and the one behind the last of the best interval; running sums (n + 1, d), (n + 1, d, d)."""
-    edges = np.unique(np.linspace(0, n, min(_BLOCKS, n) + 1).astype(np.int64))
-    gain, i, j = _among(hits, size, edges, edges, n)
-    near = int(np.ceil(n / _BLOCKS))
-    for _ in range(2):
-        firsts, lasts = (np.arange(max(at - near, 0), min(at + near, n) + 1) for at in (i, j))
-        gain, i, j = _among(hits, size, firsts, lasts, n)
+def _best(column: Floats, rest: Floats, starts: Ints) -> tuple[float, int, int]:
+    """Gain, first instant and the one behind the last of the best interval of rows (w,) in time; starts: first row of every
+    instant.
+    """
+    n, ends = len(starts), np.append(starts, len(rest))
+    edges, near = np.unique(np.linspace(0, n, min(_BLOCKS, n) + 1).astype(np.int64)), int(np.ceil(n / _BLOCKS))
+    shortest = LEAST_ROWS * len(rest) // n
+    for _ in range(3):
+        motion, left = column[:, None], rest[:, None]
+        gain, *rows = best_window(motion, left, np.zeros((*motion.shape, 0)), ends[edges], shortest)
+        i, j = np.searchsorted(ends, rows).tolist()
+        edges = np.unique(np.clip([[at + by for by in range(-near, near + 1)] for at in (i, j)], 0, n))
     return gain, i, j
-
-
-def _among(hits: Floats, size: Floats, firsts: np.ndarray, lasts: np.ndarray, n: int) -> tuple[float, int, int]:
-    length = lasts[None, :] - firsts[:, None]
-    energy = size[lasts][None, :] - size[firsts][:, None]
-    sums = hits[lasts][None, :] - hits[firsts][:, None]
-    whole = np.trace(energy, axis1=2, axis2=3)
-    fair = (length >= LEAST_ROWS) & (length <= LONGEST * n) & (whole > 0.0)
-    eye = np.eye(sums.shape[2])
-    energy = np.where(fair[:, :, None, None], energy + 1e-9 * whole[:, :, None, None] * eye, eye)
-    gain = np.where(fair, np.sum(sums * np.linalg.solve(energy, sums[..., None])[..., 0], axis=2), 0.0)
-    a, b = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    return float(gain[a, b]), int(firsts[a]), int(lasts[b])

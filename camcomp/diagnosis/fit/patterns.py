@@ -1,8 +1,7 @@
-"""Patterns that no library states: covariates on which a residual may depend.
+"""Functions of one covariate each on which a residual may depend: the dictionary of model/discrepancy for runs of programs.
 
-They serve three ends: the noise is measured jointly with them, an unknown effect is found by them, and they name the
-covariates that it depends on. A pattern moves a carriage (and so the tip, through the machine's own Jacobian), an encoder, a drive force,
-the tip itself, or the dynamometer.
+An unknown effect is found by them, and they name the covariates that it depends on. A function moves a carriage (and so the
+tip, in any direction), an encoder, a drive force, the tip itself, or the dynamometer.
 """
 
 from collections.abc import Iterable, Sequence
@@ -11,41 +10,53 @@ from itertools import product
 
 import numpy as np
 
+from camcomp.diagnosis.model.discrepancy import ORDERS, smooth_functions
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion
 
-_KNOTS = 12  # hats along the travel of an actuator
-_PLACES = 20  # hats along an axis of the workpiece: a bump of a tenth of the travel is still seen
-_MOMENTS = 24  # hats along the time of all runs
+_FINER = 2 * ORDERS  # cosines over a travel, and over the time of all runs
 _MOVES = 1e-3  # of the highest speed, from which on something moves
 _RELAX_MM = (0.5, 3.0)
 KINDS = ("tip", "encoder", "drive", "dyno")
+Functions = list[list[Floats]]  # (n,) per run and function
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ground:
-    """What patterns of one run are made of: motion at its rows (n), model drive force (n, m), model force (n, 3), rate of
-    the tip (n, 3) mm/s in the program frame, and which channels were measured.
+    """What functions of one run are made of: motion at its rows (n), model drive force (n, m), model force (n, 3), place (n, 3) mm
+    and rate (n, 3) mm/s of the tip in the program frame, and which channels were measured.
     """
 
     motion: Motion
     drive: Floats
     force: Floats
-    tip: Floats  # (n, 3) mm, program frame
+    tip: Floats
     velocity: Floats
     present: dict[str, bool]
 
 
 @dataclass(frozen=True, eq=False)
 class Dictionary:
-    """Patterns of one kind of channel. labels (p,): covariate; blocks: per run (c n, p), c channels from `first` on."""
+    """Functions of one kind of channel. labels (p,): covariate; blocks: per run (c n, p), c channels from `first` on."""
 
     kind: str
     first: int
     labels: tuple[str, ...]
     blocks: tuple[ByChannel, ...]
+
+
+def _smooth(values: Sequence[Floats | None], orders: int = ORDERS, least: float = 1e-9) -> Functions:
+    """Smooth functions of a covariate (n,) per run over its range; none where it varies by less than `least`.
+
+    None: a run that did not log it, whose functions are 0.
+    """
+    known = np.concatenate([v for v in values if v is not None] or [np.zeros(1)])
+    low, high = float(known.min()), float(known.max())
+    if high - low < least:
+        return [[] for _ in values]
+    return [[] if v is None else list(smooth_functions(v, low, high, orders).T) for v in values]
 
 
 def _reversal(motion: Motion, length: float, j: int) -> Floats:
@@ -58,62 +69,33 @@ def _reversal(motion: Motion, length: float, j: int) -> Floats:
         return np.where(np.isfinite(last), 2.0 * np.exp(-(travelled - last) / length) * sign, 0.0)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Sizes:
-    """Scales, over all runs, that make covariates dimensionless."""
-
-    low: Floats
-    span: Floats
-    fast: Floats
-    strong: Floats
-    start: float
-    length: float
-
-
-def _sizes(grounds: Sequence[Ground]) -> _Sizes:
-    position = np.concatenate([g.motion.encoder for g in grounds])
-    low = position.min(axis=0)
-    start = min(float(g.motion.common.min()) for g in grounds)
-    return _Sizes(
-        low=low, span=np.maximum(position.max(axis=0) - low, 1e-9),
-        fast=np.maximum(np.max([np.abs(g.motion.speed).max(axis=0) for g in grounds], axis=0), 1e-9),
-        strong=np.maximum(np.max([np.abs(g.drive).max(axis=0) for g in grounds], axis=0), 1e-9), start=start,
-        length=max(max(float(g.motion.common.max()) for g in grounds) - start, 1e-9),
-    )  # fmt: skip
-
-
-def _of_actuator(g: Ground, size: _Sizes, j: int, knots: int) -> dict[str, list[Floats]]:
-    """Functions (n,) of about size one of the motion and force of actuator j, by covariate."""
-    m = g.motion
-    x = (m.encoder[:, j] - size.low[j]) / size.span[j]
-    v = m.speed[:, j] / size.fast[j]
-    d = g.drive[:, j] / size.strong[j]
-    out = {
-        "position": hats(x, knots),
-        "velocity": [v, v * np.abs(v), np.abs(v)],
-        "reversal": [m.direction[:, j], *(_reversal(m, each, j) for each in _RELAX_MM)],
-        "force": [d, d * np.abs(d)],
+def _of_actuator(grounds: Sequence[Ground], j: int) -> dict[str, Functions]:
+    """Functions of the motion and force of actuator j, by covariate."""
+    motions = [g.motion for g in grounds]
+    rates = [np.gradient(m.speed[:, j], m.time) if m.ordered and len(m.time) > 2 else 0.0 * m.time for m in motions]
+    return {
+        "position": _smooth([m.encoder[:, j] for m in motions], _FINER),
+        "velocity": _smooth([m.speed[:, j] for m in motions]),
+        "reversal": [[m.direction[:, j], *(_reversal(m, each, j) for each in _RELAX_MM)] for m in motions],
+        "force": _smooth([g.drive[:, j] for g in grounds]),
+        "acceleration": _smooth(rates),
     }
-    push = np.gradient(m.speed[:, j], m.time) if m.ordered and len(m.time) > 2 else np.zeros(len(m.time))
-    out["acceleration"] = [push / max(float(np.abs(push).max(initial=0.0)), 1e-9)]
-    return out
 
 
-def hats(x: Floats, knots: int) -> list[Floats]:
-    """Piecewise linear functions (n,) that are 1 at one knot and 0 at the others, for x (n,) in 0 .. 1."""
-    return [np.maximum(1.0 - np.abs(x * (knots - 1) - n), 0.0) for n in range(knots)]
-
-
-def _of_time(g: Ground, size: _Sizes, *, warmth: bool) -> dict[str, list[Floats]]:
-    """Functions (n,) of time, and of temperature where some run logged it; zero in runs that did not."""
-    t = 2.0 * (g.motion.common - size.start) / size.length - 1.0
-    own = g.motion.time - g.motion.time[0]
-    u = 2.0 * own / max(float(own[-1]), 1e-9) - 1.0
-    out = {"time": [np.ones_like(t), t, 0.5 * (3 * t**2 - 1), u, 0.5 * (3 * u**2 - 1)]}
-    if warmth:
-        logged = g.motion.temperature
-        out["temperature"] = [np.zeros_like(t) if logged is None else (logged - 20.0) / 10.0]
-    return out
+def _of_time(grounds: Sequence[Ground]) -> dict[str, Functions]:
+    """Functions of time (common clock, own time of a run, measured time one run after the other), and of temperature."""
+    motions = [g.motion for g in grounds]
+    spent = [m.time - m.time[0] for m in motions]
+    begin = np.concatenate([[0.0], np.cumsum([float(t[-1]) for t in spent])])
+    clocks = [
+        _smooth([m.common for m in motions]), _smooth([t / max(float(t[-1]), 1e-9) for t in spent]),
+        _smooth([b + t for b, t in zip(begin, spent, strict=False)], _FINER),
+    ]  # fmt: skip
+    each = zip(motions, *clocks, strict=True)
+    return {
+        "time": [[np.ones_like(m.time), *(f for clock in own for f in clock)] for m, *own in each],
+        "temperature": _smooth([m.temperature for m in motions]),
+    }
 
 
 def _of_direction(g: Ground) -> list[Floats]:
@@ -125,21 +107,21 @@ def _of_direction(g: Ground) -> list[Floats]:
 
 
 class _Store:
-    """Collects patterns of one kind in its unit, um or N; patterns that are zero in every run are dropped."""
+    """Collects functions of one kind in its unit, um or N; those that are zero in every run are dropped."""
 
-    def __init__(self, kind: str, first: int, width: int, runs: int) -> None:
-        self.kind, self.first, self.width = kind, first, width
+    def __init__(self, kind: str, first: int, width: int, rows: Sequence[int]) -> None:
+        self.kind, self.first, self.width, self.rows = kind, first, width, rows
         self.size = 1e-3 if kind in ("tip", "encoder") else 1.0
         self.labels: list[str] = []
         self.channels: list[int] = []
-        self.columns: list[list[Floats]] = [[] for _ in range(runs)]
+        self.columns: list[list[Floats]] = [[] for _ in rows]
 
-    def put(self, label: str, channels: Iterable[int], functions: Iterable[Sequence[Floats]]) -> None:
-        """Add every function, of every run, to each of the channels."""
+    def put(self, label: str, channels: Iterable[int], functions: Functions) -> None:
+        """Add every function, of every run, to each of the channels; of runs without any it is 0."""
+        count = max(map(len, functions))
+        full = [own or [np.zeros(n)] * count for own, n in zip(functions, self.rows, strict=True)]
         each = [
-            per_run
-            for per_run in zip(*functions, strict=True)
-            if any(np.abs(v).max(initial=0.0) >= 1e-12 for v in per_run)
+            per_run for per_run in zip(*full, strict=True) if any(np.abs(v).max(initial=0.0) >= 1e-12 for v in per_run)
         ]
         for per_run, channel in product(each, channels):
             self.labels.append(label)
@@ -158,50 +140,28 @@ class _Store:
 
 
 def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dictionary]:
-    """All patterns of the channels that were measured; unit size is 1 um or 1 N."""
-    size, m = _sizes(grounds), len(actuators)
-    rows = sum(len(g.tip) for g in grounds)
-    knots = int(np.clip(rows / 250, 4, _KNOTS))
-    every = [
-        _Store("tip", 0, 3, len(grounds)), _Store("encoder", 3, m, len(grounds)),
-        _Store("drive", 3 + m, m, len(grounds)), _Store("dyno", 3 + 2 * m, 3, len(grounds)),
-    ]  # fmt: skip
-    stores = {store.kind: store for store in every if any(g.present[store.kind] for g in grounds)}
+    """All functions of the channels that were measured; unit size is 1 um or 1 N."""
+    m, rows = len(actuators), [len(g.tip) for g in grounds]
+    every = zip(KINDS, (0, 3, 3 + m, 3 + 2 * m), (3, m, m, 3), strict=True)
+    stores = {
+        kind: _Store(kind, first, width, rows) for kind, first, width in every if any(g.present[kind] for g in grounds)
+    }
     for j, a in enumerate(actuators):
-        for kind, store in stores.items():
-            if kind == "dyno":
-                continue
-            per_run = [_of_actuator(g, size, j, 5 if kind == "encoder" else knots) for g in grounds]
-            for name in [name for name in per_run[0] if (kind, name) != ("encoder", "force")]:
+        for name, functions in _of_actuator(grounds, j).items():
+            for kind in stores.keys() - {"dyno", "encoder" if name == "force" else ""}:
                 # a displaced carriage moves the tip in any direction
-                store.put(f"{name}:{a}", range(3) if kind == "tip" else (j,), [f[name] for f in per_run])
-    warmth = any(g.motion.temperature is not None for g in grounds)
-    times = [_of_time(g, size, warmth=warmth) for g in grounds]
-    for kind, store in stores.items():
-        for channel, of in enumerate("xyz" if kind in ("tip", "dyno") else actuators):
-            for name in times[0]:
-                store.put(f"{name}:{of}", (channel,), [functions[name] for functions in times])
-    if "tip" in stores:
-        _put_moments_and_places(stores["tip"], grounds, rows)
+                stores[kind].put(f"{name}:{a}", range(3) if kind == "tip" else (j,), functions)
+    for name, functions in _of_time(grounds).items():
+        for kind, store in stores.items():
+            for channel, of in enumerate("xyz" if kind in ("tip", "dyno") else actuators):
+                store.put(f"{name}:{of}", (channel,), functions)
     turns = [_of_direction(g) for g in grounds]
     for axis, name in enumerate("xyz"):
-        loads = [[g.force[:, axis] / 100.0] for g in grounds]
-        for kind, store in stores.items():
-            if kind in ("tip", "dyno"):
-                store.put(f"direction:{name}", (axis,), turns)
-                store.put(f"force:{name}", range(3) if kind == "tip" else (axis,), loads)
+        loads = _smooth([g.force[:, axis] for g in grounds])
+        for kind in stores.keys() & {"tip", "dyno"}:
+            stores[kind].put(f"direction:{name}", (axis,), turns)
+            stores[kind].put(f"force:{name}", range(3) if kind == "tip" else (axis,), loads)
+        if "tip" in stores:
+            places = _smooth([g.tip[:, axis] for g in grounds], _FINER, REPEATABILITY_MM)
+            stores["tip"].put(f"position:{name}", range(3), places)
     return [store.done() for store in stores.values()]
-
-
-def _put_moments_and_places(tip: _Store, grounds: Sequence[Ground], rows: int) -> None:
-    """Add hats over the measured time, one run after the other, and over the axes of the workpiece."""
-    spent = [g.motion.time - g.motion.time[0] for g in grounds]
-    begin = np.concatenate([[0.0], np.cumsum([float(t[-1]) for t in spent])])
-    knots, places_of = int(np.clip(rows / 100, 4, _MOMENTS)), int(np.clip(rows / 150, 4, _PLACES))
-    moments = [hats((b + t) / max(float(begin[-1]), 1e-9), knots) for b, t in zip(begin, spent, strict=False)]
-    for i, (channel, axis) in product(range(knots), enumerate("xyz")):
-        tip.put(f"time:{axis}", (channel,), [[each[i]] for each in moments])
-    places = np.concatenate([g.tip for g in grounds])
-    low, span = places.min(axis=0), np.ptp(places, axis=0)
-    for k in np.flatnonzero(span >= REPEATABILITY_MM):
-        tip.put(f"position:{'xyz'[k]}", range(3), [hats((g.tip[:, k] - low[k]) / span[k], places_of) for g in grounds])

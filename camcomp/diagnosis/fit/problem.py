@@ -11,7 +11,6 @@ from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
 from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
 from camcomp.diagnosis.fit.patterns import KINDS, Dictionary
-from camcomp.diagnosis.fit.ringing import FOLLOWED, loudest
 from camcomp.diagnosis.fit.small_forces import bent_farther
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import ByChannel
@@ -51,7 +50,7 @@ class Problem:
     white_residual: list[Floats]
     shapes: dict[int, dict[str, float]]
     candidates: CausePrior
-    _heard: dict[int, tuple[float, float]] = field(default_factory=dict, init=False, repr=False)
+    _followed: set[int] = field(default_factory=set, init=False, repr=False)
     _last: tuple[tuple[object, ...], list[Reading]] | None = field(default=None, init=False, repr=False)
 
     @cached_property
@@ -133,17 +132,30 @@ class Problem:
         for i in members:
             if i in self.small_members(best):
                 continue  # it will not be named, whatever its law
-            for p in self.columns.candidates[i].switches:
-                for value in p.either:
+            for p, values in self._laws_of(i):
+                for value in values:
                     if value == best.extra.get(i, {}).get(p.name, p.nominal):
                         continue
-                    laws = {m: {q.name: best.extra[m][q.name] for q in self.columns.candidates[m].switches}
-                            for m in best.extra}  # fmt: skip
+                    laws = {m: {q.name: best.extra[m][q.name] for q, _ in self._laws_of(m)} for m in best.extra}
                     laws[i] = {**laws.get(i, {}), p.name: value}
                     other = self._refit(members, best.theta, laws)
                     if other.log_evidence > best.log_evidence + EQUAL_LOG_ODDS:
                         best = other
+                if p.scan:  # once per candidate: other sets begin with what was found
+                    self.shapes[i] = {**self.shapes[i], p.name: best.extra[i][p.name]}
+                    self._followed.add(i)
         return best
+
+    def _laws_of(self, i: int) -> list[tuple[Parameter, Sequence[float]]]:
+        """Shapes of a candidate that are tried one by one at the effect's size, with their values.
+
+        Laws of an effect, and shapes that show at its size alone: at nominal all dampings of a loop do the same.
+        """
+        candidate = self.columns.candidates[i]
+        laws: list[tuple[Parameter, Sequence[float]]] = [(p, p.either) for p in candidate.switches]
+        if i in self._followed or stages_of(candidate.effect) == {"drive"} or hasattr(candidate.effect, "first_guess"):
+            return laws
+        return [*laws, *((p, p.scan) for p in candidate.shapes)]
 
     def _refit(
         self, members: Members, theta: Floats | None, laws: Mapping[int, Mapping[str, float]], passes: int = 5
@@ -160,7 +172,7 @@ class Problem:
         white = [W[:, index] for W in self.white]
         left = list(self.white_residual)
         bent = False
-        passes += (1 if shapes else 0) + (FOLLOWED if self._ringing(members) else 0)
+        passes += 1 if shapes else 0
         far, most = False, passes + FARTHER
         for step in range(most):
             if step >= passes and not far:
@@ -172,9 +184,6 @@ class Problem:
                 theta = self._bounded(members, estimate(total(grams), self.prior, index)[0][index])
                 break
             bent = bent or (step == 0 and bend > BENT)
-            if step == 0 and bend > STRAIGHT and self._ringing(members):
-                theta, readings = self._readings(members, self._loudest(members, theta, shapes), shapes)
-                now = self._white_at(readings)
             moved = self._columns_at(members, theta, shapes, readings, bent)
             white = [self._stacked(k, [m[k] for m in moved], index) for k in range(len(self.bench.runs))]
             left = [r + W @ theta for r, W in zip(now, white, strict=True)]
@@ -373,32 +382,6 @@ class Problem:
         t = self.times[k]
         at = (t - t[0]) / max(float(t[-1] - t[0]), 1e-12)
         return self.noise.rows_of(k, at, self.inflate[k])
-
-    def _ringing(self, members: Members) -> list[tuple[int, Parameter, Bools]]:
-        """Shapes that show at the effect's size alone, and which coordinates (d,) are that size."""
-        index = self.member_columns(members)
-        return [
-            (i, p, np.isin(index, self.candidates.columns[i]))
-            for i, p in self.shapes_of(members)
-            if stages_of(self.columns.candidates[i].effect) != {"drive"}
-        ]
-
-    def _loudest(self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]]) -> Floats:
-        """Where to follow what rings from; sought once per candidate, because that reads the twin some dozen times."""
-
-        def evidence(at: Floats, there: dict[int, dict[str, float]]) -> float:
-            now = self._white_at(self._read(self.causes(members, at, there)))
-            runs = zip(self.base_grams, self.white, now, strict=True)
-            left = [Gram(g.A, W.T @ r, float(r @ r), len(r)) for g, W, r in runs]
-            return Scale(total(left), self.prior, self.candidates)(())
-
-        asked = self._ringing(members)
-        for i, p, own in asked:
-            if i in self._heard:
-                shapes[i][p.name], theta = self._heard[i][0], np.where(own, self._heard[i][1], theta)
-        theta = loudest([each for each in asked if each[0] not in self._heard], evidence, theta, shapes)
-        self._heard |= {i: (shapes[i][p.name], float(theta[own][0])) for i, p, own in asked}
-        return theta
 
     def _move_shapes(
         self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]], left: Sequence[Floats],
