@@ -7,6 +7,7 @@ import pytest
 
 from camcomp.diagnosis.experiment.driven_run import _aligned
 from camcomp.diagnosis.experiment.log_checks import FAR_MM
+from camcomp.diagnosis.experiment.logged import Logged
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
 from camcomp.model.control import open_program
@@ -30,7 +31,10 @@ def driven(tmp_path):
 
 
 def logged(line):
-    return SimpleNamespace(file="log.csv", run="run", measured=SimpleNamespace(line=line))
+    measured = SimpleNamespace(line=line)
+    return Logged(
+        file="log.csv", run="run", measured=measured, twin=None, started=0.0, temperature=None, acceleration=1.0
+    )
 
 
 def test_lines_are_those_of_another_pass_until_it_is_known_how_far_the_tool_bends(driven):

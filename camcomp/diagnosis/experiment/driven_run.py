@@ -18,26 +18,25 @@ from camcomp.diagnosis.experiment.log_checks import (
     check_set_points,
     places,
 )
+from camcomp.diagnosis.experiment.logged import Logged
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
 from camcomp.diagnosis.fit.starts import BEGUN_ANEW
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, shelf
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
-from camcomp.ground.errors import ConfigError, Location, PhysicsError
+from camcomp.ground.errors import PhysicsError
 from camcomp.model.cutting.track import JOIN_ANGLE, Conditions, Track, lay_track
 from camcomp.model.effect import Cause
 from camcomp.model.motion.alignment import LOST_MM, Aligned, align, way_from_lines
-from camcomp.model.motion.driven_path import MAX_CUT_DISTANCE_MM, Forces, cutting_forces, driven_path
+from camcomp.model.motion.driven_path import MAX_CUT_DISTANCE_MM, Forces, cutting_forces
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Twin
+from camcomp.model.statics.arm import ARM_LENGTH
 from camcomp.model.trajectory.segments import merged
 
 SAMPLE_MM = 2.0  # distance of points of the program for comparisons
-GUESSED_MM, GUESSED_RAD = (
-    1e-3,
-    1e-6,
-)  # by which an empty cell's actuator may stand beside the line between its neighbours
+GUESSED_MM = 1e-3  # by which an empty cell's actuator may stand beside the line between its neighbours; of a hinge, on an arm of 1 m
 STILL_S = 0.1  # duration from which a standstill at the end of a line may be idle time
 STILL_MM = 0.005
 MOST_PASSES = 8  # of the alignment with a deflected tip
@@ -64,37 +63,6 @@ class DrivenRun:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Logged:
-    """The log of a run: file and run for messages; started: s on the common clock; temperature (n,) or None; acceleration: of
-    the controller, mm/s2.
-    """
-
-    file: str
-    run: str
-    measured: Measured
-    twin: Twin
-    started: float
-    temperature: Floats | None
-    acceleration: float
-
-    def refusal(self, rule: str, message: str) -> ConfigError:
-        """The error of a rule in this log."""
-        return ConfigError(rule, f"run '{self.run}'{message}", at=Location(self.file, 1, 1))
-
-    def path(self, rho: Floats, tip: Floats, forces: Forces, rotation: Floats | None) -> RunPath:
-        """Run path of actuators (n, m) with their tips (n, 3), program frame, and rotations (n, 3, 3) of the platform."""
-        return driven_path(
-            self.twin, self.run, time=self.measured.time, rho=rho, tip=tip, forces=forces, started=self.started,
-            temperature=self.temperature, rotation=rotation,
-        )  # fmt: skip
-
-    def over_time(self, values: Floats, known: Bools | None = None) -> Floats:
-        """Values (n, c) with empty cells, and rows that are not known (n,), interpolated over time."""
-        seen = values if known is None else np.where(known[:, None], values, np.nan)
-        return np.column_stack([_over_time(self.measured.time, v) for v in seen.T])
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
 class _Program:
     """A program with its loads and sampled positions: tips (s, 3) mm, program frame, and actuators (s, m).
 
@@ -117,23 +85,17 @@ class _Program:
 
 def drive(log: Logged, text: Program | None, conditions: Conditions) -> DrivenRun:
     """The run of a log; text: its program, or None. Raises ConfigError CC402, CC406 to CC408."""
-    twin, measured = log.twin, log.measured
+    twin = log.twin
     program = None if text is None else _open(text, conditions, twin)
     by = _channel(log, has_program=program is not None)
     if by == "tip" and program is not None:
         return _led_by_tip(log, program)
     rho, guessed = _commanded(log, by)
-    revolute = np.array([a.revolute for a in twin.robot.actuators])
-    rotary = bool(revolute.all())
     if program is not None:
-        check_set_points(
-            log.file, log.run, what=by, told=rho, program=program.rho, actuators=twin.actuators, rotary=rotary
-        )
+        check_set_points(log, what=by, told=rho, program=program.rho)
     tip, turned = _forward(twin, rho, *_near(log, rho, program))
     aligned = None if program is None else _aligned(log, program, tip)
-    check = partial(
-        check_places, log.file, log.run, measured=measured, rho=rho, tip=tip, actuators=twin.actuators, rotary=rotary
-    )
+    check = partial(check_places, log, rho=rho, tip=tip)
     cut: Aligned | None = None
     try:
         if program is not None and by == "setpoint":
@@ -152,10 +114,7 @@ def drive(log: Logged, text: Program | None, conditions: Conditions) -> DrivenRu
         )  # fmt: skip
     loaded = cache(lambda: twin.sense(run_path)[0])
     check(loaded=lambda: loaded().tip)
-    check_forces(
-        name=log.file, run=log.run, measured=measured, force=run_path.row_force, drives=lambda: loaded().drive,
-        rotary=revolute,
-    )  # fmt: skip
+    check_forces(log, run_path.row_force, lambda: loaded().drive)
     return DrivenRun(
         run_path=run_path, by=by, unsure=np.asarray(guessed.any(axis=1)) | idle, guessed=guessed, turn=None,
         lag=0 if aligned is None else aligned.lag,
@@ -176,8 +135,8 @@ def _commanded(log: Logged, by: str) -> tuple[Floats, Bools]:
     if np.isfinite(logged).sum(axis=0).min() < 2:
         raise log.refusal("CC404", f": hardly a row holds the {by} of every actuator")
     guessed = [
-        _guessed(time, v, GUESSED_RAD if a.revolute else GUESSED_MM)
-        for v, a in zip(logged.T, log.twin.robot.actuators, strict=True)
+        _guessed(time, v, GUESSED_MM / (ARM_LENGTH if hinge else 1.0))
+        for v, hinge in zip(logged.T, log.revolute, strict=True)
     ]
     return log.over_time(logged), np.column_stack(guessed)
 
@@ -272,9 +231,9 @@ def _aligned(log: Logged, program: _Program, tip: Floats, aside_mm: float = ASID
         lines = sorted({int(each) for each in line[known]})[:5]
         raise log.refusal("CC406", f": the rows are on lines that the program does not move on, e.g. {lines}")
     found = align(path, tip, line, max(aside_mm, LOST_MM))
-    check_followed(log.file, log.run, found.distance[places(tip)], _agreement(path, found, tip), aside_mm)
+    check_followed(log, found.distance[places(tip)], _agreement(path, found, tip), aside_mm)
     if aside_mm <= ASIDE_MM:
-        check_lines(log.file, log.run, way_from_lines(path, found))
+        check_lines(log, way_from_lines(path, found))
     return found
 
 
@@ -310,12 +269,6 @@ def _agreement(path: Path, found: Aligned, tip: Floats) -> float:
     step = np.linalg.norm(np.diff(tip, axis=0), axis=1)
     moving = step > STILL_MM
     return float(np.mean(np.diff(at)[moving] > -0.5 * step[moving])) if moving.any() else 1.0
-
-
-def _over_time(time: Floats, values: Floats) -> Floats:
-    """Values (n,) with empty cells interpolated over time."""
-    known = np.isfinite(values)
-    return np.interp(time, time[known], values[known])
 
 
 def _guessed(time: Floats, values: Floats, most: float) -> Bools:
@@ -358,7 +311,7 @@ def _led_by_tip(log: Logged, program: _Program) -> DrivenRun:
     """Run of a measured tip aligned with the program: its timing is free, and only its lateral deviation is evidence."""
     path, twin, measured = program.track.path, log.twin, log.measured
     known = np.asarray(np.isfinite(measured.tip).all(axis=1))
-    check_on_program(log.file, log.run, measured.tip[known], program.tips)
+    check_on_program(log, measured.tip[known], program.tips)
     whole = log.over_time(measured.tip, known)
     bend, changed = np.zeros_like(whole), np.inf
     # a deflected tip is off its program by an unknown amount at first, and its position on arcs depends on the deflection

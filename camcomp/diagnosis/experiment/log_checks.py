@@ -7,10 +7,11 @@ from itertools import permutations
 import numpy as np
 from scipy.spatial import KDTree
 
+from camcomp.diagnosis.experiment.logged import Logged
 from camcomp.diagnosis.fit.floor import LEAST_ROWS
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
-from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.statics.arm import ARM_LENGTH
 
@@ -71,34 +72,28 @@ def check_clock(name: str, measured: Measured) -> None:
         raise ConfigError("CC405", message, at=Location(name, row + 3, 1))
 
 
-def check_length(name: str, run: str, measured: Measured, due_s: float) -> None:
+def check_length(log: Logged, due_s: float) -> None:
     """Raise CC409 for a run with too few rows, CC407 for times in another unit; due_s: duration of the program."""
-    rows = len(measured.time)
+    rows = len(log.measured.time)
     if rows < LEAST_ROWS:
-        message = f"run '{run}': the log has {rows} row{'s' if rows > 1 else ''}, {LEAST_ROWS} are the least"
-        raise ConfigError("CC409", message, at=Location(name, rows + 1, 1))
-    took = float(measured.time[-1] - measured.time[0])
+        message = f"run '{log.run}': the log has {rows} row{'s' if rows > 1 else ''}, {LEAST_ROWS} are the least"
+        raise ConfigError("CC409", message, at=Location(log.file, rows + 1, 1))
+    took = float(log.measured.time[-1] - log.measured.time[0])
     for factor, unit in _TIMES.items():
         if due_s > 0.0 and SAME_TIME[0] < took / (factor * due_s) < SAME_TIME[1]:
-            message = (
-                f"run '{run}': the log takes {took:g} s and the program {due_s:.3g} s: t_s looks as if logged in {unit}"
-            )
-            raise ConfigError("CC407", message, at=Location(name, 1, 1))
+            both = f"the log takes {took:g} s and the program {due_s:.3g} s"
+            raise log.refusal("CC407", f": {both}: t_s looks as if logged in {unit}")
 
 
-def check_forces(
-    name: str, run: str, measured: Measured, force: Floats, drives: Callable[[], Floats], rotary: Bools
-) -> None:
+def check_forces(log: Logged, force: Floats, drives: Callable[[], Floats]) -> None:
     """Raise CC407 for forces or torques that differ from the modelled ones by a factor of 1000, row by row.
 
     Args:
-        name: log, for the message.
-        run: its run, for the message.
-        measured: the log.
+        log: what was measured.
         force: (n, 3) N, modelled force on the tool, machine frame.
         drives: returns (n, m) modelled drive forces, N, and torques, N mm; called only if some are logged.
-        rotary: (m,) whether the actuator turns.
     """
+    measured, rotary = log.measured, log.revolute
     channels = [("dynamometer forces", measured.dyno, force, _STRONG_N, _FORCES)]
     if measured.has("drive"):
         due = drives()
@@ -109,8 +104,7 @@ def check_forces(
     for what, found, due, strong, units in channels:
         for factor, unit in units.items():
             if _is_scaled(found, due, factor, strong):
-                message = f"run '{run}': the {what} look as if logged in {unit}"
-                raise ConfigError("CC407", message, at=Location(name, 1, 1))
+                raise log.refusal("CC407", f": the {what} look as if logged in {unit}")
 
 
 def _is_scaled(found: Floats, due: Floats, factor: float, strong: float) -> bool:
@@ -128,32 +122,31 @@ def _is_scaled(found: Floats, due: Floats, factor: float, strong: float) -> bool
     return bool(np.mean(x * y) > np.sqrt(0.5) * size * modelled)  # half of the energy correlates
 
 
-def check_followed(name: str, run: str, distance: Floats, agreement: float, aside_mm: float = ASIDE_MM) -> None:
+def check_followed(log: Logged, distance: Floats, agreement: float, aside_mm: float = ASIDE_MM) -> None:
     """Raise CC406 for a motion off the program: distance (n,) mm from it; agreement: share of rows in its direction, most are."""
     off = float(np.median(distance))
     if off > aside_mm or agreement < 0.5:
         way = f"{off:.3g} mm beside the program" if off > aside_mm else "against the way of the program"
-        raise ConfigError("CC406", f"run '{run}': the motion runs {way}", at=Location(name, 1, 1))
+        raise log.refusal("CC406", f": the motion runs {way}")
 
 
-def check_lines(name: str, run: str, away: Floats) -> None:
+def check_lines(log: Logged, away: Floats) -> None:
     """Raise CC406 for line numbers of other positions: away (n,) mm of path length from the line of a row."""
     known = away[np.isfinite(away)]
     if len(known) >= LEAST_ROWS and np.median(known) > FAR_MM:
         message = (
-            f"run '{run}': the rows are {np.median(known):.3g} mm of way from the lines that they name: the column line looks "
+            f": the rows are {np.median(known):.3g} mm of way from the lines that they name: the column line looks "
             "like that of another program, or like numbers N in place of lines counted from 1"
         )
-        raise ConfigError("CC406", message, at=Location(name, 1, 1))
+        raise log.refusal("CC406", message)
 
 
-def check_rows_together(
-    name: str, run: str, *, what: str, time: Floats, found: Floats, due: Floats, other: str
-) -> None:
+def check_rows_together(log: Logged, *, what: str, found: Floats, due: Floats, other: str) -> None:
     """Raise CC412 for a channel found (n, k) that fits the expected one, due (n, k), far better when shifted by rows.
 
     Only for rows longer than LATEST_S, because a clock offset or a late drive could otherwise be the reason.
     """
+    time = log.measured.time
     usual = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
 
     def off(by: int) -> float:
@@ -167,60 +160,33 @@ def check_rows_together(
     by = min((0, *(each for each in ROWS_APART if abs(each) * usual > LATEST_S)), key=off)
     if by and off(by) < 0.5 * off(0):
         way = "behind" if by < 0 else "ahead of"
-        message = f"run '{run}': the {what} {abs(by)} row{'s' if abs(by) > 1 else ''} {way} {other}"
-        raise ConfigError("CC412", message, at=Location(name, 1, 1))
+        raise log.refusal("CC412", f": the {what} {abs(by)} row{'s' if abs(by) > 1 else ''} {way} {other}")
 
 
-def check_places(
-    name: str,
-    run: str,
-    *,
-    measured: Measured,
-    rho: Floats,
-    tip: Floats,
-    actuators: Sequence[str],
-    rotary: bool = False,
-    loaded: Callable[[], Floats] | None = None,
-) -> None:
+def check_places(log: Logged, *, rho: Floats, tip: Floats, loaded: Callable[[], Floats]) -> None:
     """Raise CC407 (units), CC408 (axes), CC406 (another program), CC412 (rows) for tip or encoders far from the expected ones.
 
-    tip (n, 3) mm, rho (n, m): expected tips and actuators; rotary: all actuators are hinges; loaded: returns the tips (n, 3)
-    under the modelled force, called if the measured ones are far from the unloaded ones.
+    tip (n, 3) mm, rho (n, m): expected tips and actuators; loaded: returns the tips (n, 3) under the modelled force, called if the
+    measured ones are far from the unloaded ones.
     """
-    far = FAR_RAD if rotary else FAR_MM
-    told = "set-point" if measured.has("setpoint") else "encoder"
-    for what, found, due, most, names in (
-        ("tip looks", measured.tip, tip, FAR_MM, AXES),
-        ("encoders look", measured.encoder, rho, far, actuators),
-    ):
+    measured, told = log.measured, "set-point" if log.measured.has("setpoint") else "encoder"
+    for what, found, due in (("tip looks", measured.tip, tip), ("encoders look", measured.encoder, rho)):
         rows = np.isfinite(found).all(axis=1)
         if rows.any():
-            if what.startswith("tip") and loaded is not None and _distance(found[rows], due=due[rows]) >= most:
+            if due is tip and _distance(found[rows], due=due[rows]) >= FAR_MM:
                 due = loaded()
-            check_rows_together(name, run, what=what, time=measured.time, found=found, due=due, other=f"the {told}s")
-            _check(
-                name, run, what=what, found=found[rows], distance=partial(_distance, due=due[rows]), far=most,
-                names=names, rotary=rotary and most == FAR_RAD,
-            )  # fmt: skip
+            check_rows_together(log, what=what, found=found, due=due, other=f"the {told}s")
+            _check(log, what, found[rows], partial(_distance, due=due[rows]))
 
 
-def check_set_points(
-    name: str, run: str, *, what: str, told: Floats, program: Floats, actuators: Sequence[str], rotary: bool = False
-) -> None:
+def check_set_points(log: Logged, *, what: str, told: Floats, program: Floats) -> None:
     """Like `check_places` for the motion itself: set-points told (n, m) against actuators program (s, m) of the program."""
-    far = FAR_RAD if rotary else FAR_MM
-    _check(
-        name, run, what=f"{what}s look", found=told, distance=_to_nearest(program, far), far=far, names=actuators,
-        rotary=rotary,
-    )  # fmt: skip
+    _check(log, f"{what}s look", told, _to_nearest(program, FAR_RAD if log.revolute.all() else FAR_MM))
 
 
-def check_on_program(name: str, run: str, tip: Floats, program: Floats) -> None:
+def check_on_program(log: Logged, tip: Floats, program: Floats) -> None:
     """Like `check_places` if the tip is the motion: tip (n, 3) against points program (s, 3) of the program."""
-    _check(
-        name, run, what="tip looks", found=tip, distance=_to_nearest(program, FAR_MM), far=FAR_MM, names=AXES,
-        rotary=False,
-    )  # fmt: skip
+    _check(log, "tip looks", tip, _to_nearest(program, FAR_MM))
 
 
 def places(points: Floats, far: float = FAR_MM) -> Ints:
@@ -234,31 +200,20 @@ def _to_nearest(program: Floats, far: float) -> Callable[[Floats], float]:
     return lambda found: float(np.median(tree.query(found[places(found, far)])[0]))
 
 
-def _check(
-    name: str,
-    run: str,
-    *,
-    what: str,
-    found: Floats,
-    distance: Callable[[Floats], float],
-    far: float,
-    names: Sequence[str],
-    rotary: bool,
-) -> None:
-    off = distance(found)
+def _check(log: Logged, what: str, found: Floats, distance: Callable[[Floats], float]) -> None:
+    """Raise CC406 to CC408 for tips or actuators found (n, k) at a distance from the expected ones."""
+    names = AXES if what.startswith("tip") else log.twin.actuators
+    rotary = names is not AXES and bool(log.revolute.all())
+    far, unit, off = FAR_RAD if rotary else FAR_MM, "rad" if rotary else "mm", distance(found)
     if off < far:
         return
-    at = Location(name, 1, 1)
-    for factor, unit in (_TURNS if rotary else _LENGTH_UNITS).items():
+    for factor, other in (_TURNS if rotary else _LENGTH_UNITS).items():
         if distance(found / factor) < min(far, 0.5 * off):
-            raise ConfigError("CC407", f"run '{run}': the {what} as if logged in {unit}", at=at)
+            raise log.refusal("CC407", f": the {what} as if logged in {other}")
     for order, sign in _readings(len(names)):
         if distance(found[:, order] * sign) < min(far, 0.5 * off):
-            message = f"run '{run}': the {what} right {_told(names, order, sign)}"
-            raise ConfigError("CC408", message, at=at)
-    unit = "rad" if rotary else "mm"
-    message = f"run '{run}': {what.split()[0]} {off:.3g} {unit} from where the program goes"
-    raise ConfigError("CC406", message, at=at)
+            raise log.refusal("CC408", f": the {what} right {_told(names, order, sign)}")
+    raise log.refusal("CC406", f": {what.split()[0]} {off:.3g} {unit} from where the program goes")
 
 
 def _readings(m: int) -> Iterator[tuple[list[int], Floats]]:

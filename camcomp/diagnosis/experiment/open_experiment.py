@@ -7,13 +7,14 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from camcomp.diagnosis.experiment.driven_run import Logged, drive
+from camcomp.diagnosis.experiment.driven_run import drive
 from camcomp.diagnosis.experiment.log_checks import (
     check_channels,
     check_clock,
     check_length,
     check_rows,
 )
+from camcomp.diagnosis.experiment.logged import Logged
 from camcomp.diagnosis.fit.bench import Run
 from camcomp.diagnosis.fit.label_offsets import with_clocks
 from camcomp.diagnosis.fit.measured import Measured
@@ -73,13 +74,13 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     program = None if spec.program is None else open_program(spec.program, job.config)
     cutting = job if program is None else job_of_program(job, program.data, program.name)
     conditions = cutting.conditions if spec.cutting else replace(job.conditions, model=None)
-    if program is not None:
-        check_length(log, spec.name, measured, schedule(program.path, job.config.control.acceleration_mm_per_s2).end)
     logged = Logged(
         file=log, run=spec.name, measured=measured, twin=twin, started=spec.started_s,
         temperature=steadied(measured.time, measured.temperature),
         acceleration=job.config.control.acceleration_mm_per_s2,
     )  # fmt: skip
+    if program is not None:
+        check_length(logged, schedule(program.path, logged.acceleration).end)
     run = drive(logged, program, conditions)
     if run.lag:
         notes.append(f"{log}: line numbers are {abs(run.lag)} rows {'late' if run.lag > 0 else 'early'}")

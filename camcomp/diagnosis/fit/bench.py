@@ -18,6 +18,7 @@ from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.loaded_structure import Slopes, Solved, rows_together
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Reading, Twin
+from camcomp.model.statics.arm import ARM_LENGTH
 
 _SHARE_OF_SCALE = 0.05  # step of a difference
 _FEW_COLUMNS = 32  # up to which adding row to row is faster than numpy's mean
@@ -166,6 +167,11 @@ class Bench:
     def springs(self) -> Floats:
         """Stiffness (m,) of the drives, N/mm or N mm/rad; infinite where none is stated."""
         return np.array([np.inf if a.stiffness is None else a.stiffness for a in self.twin.robot.actuators])
+
+    @cached_property
+    def levers(self) -> Floats:
+        """Way (m,), mm, per unit of every actuator: 1 of a slide, that at the end of an arm of a hinge."""
+        return np.array([ARM_LENGTH if a.revolute else 1.0 for a in self.twin.robot.actuators])
 
     def at_tip(self, k: int) -> Floats:
         """Motion of the tip (n, 3, c), machine axes, per unit of every channel at the rows of run k.

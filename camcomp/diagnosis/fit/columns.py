@@ -26,7 +26,7 @@ from camcomp.model.axes import slides_of
 from camcomp.model.effect import Cause, Load, Parameter, applies
 from camcomp.model.statics.description import Link, Parallelogram, Robot
 
-RUN_OFFSET_N, RUN_OFFSET_NMM = 0.3, 300.0
+RUN_OFFSET_N = 0.3
 CLOCK_JITTER_S = 1e-5
 CLOCK_RATE = 1e-5
 SPRING_LOG = 0.01  # one link's spring against its stated value
@@ -239,16 +239,15 @@ def _nuisances(bench: Bench) -> list[Nuisance]:
     def only(r: int, values: Floats) -> list[Floats]:
         return [values if k == r else zero[k] for k in range(len(zero))]
 
-    m, hinges = len(bench.actuators), [a.revolute for a in bench.twin.robot.actuators]
+    m = len(bench.actuators)
     for r, run in enumerate(bench.runs):
         for c in range(6 + 2 * m):
             if 3 <= c < 3 + m or not np.isfinite(bench.observed(r)[:, c]).any():
                 continue
             one = zero[r].copy()
             one[:, c] = 1.0
-            size = (
-                REPEATABILITY_MM if c < 3 else RUN_OFFSET_NMM if c < 3 + 2 * m and hinges[c - 3 - m] else RUN_OFFSET_N
-            )
+            torque = bench.levers[c - 3 - m] if 3 + m <= c < 3 + 2 * m else 1.0
+            size = REPEATABILITY_MM if c < 3 else RUN_OFFSET_N * torque
             found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one)))
     found += start_columns(bench, lambda r, values: only(r, thinned(values, bench.runs[r].thin)))
     clock = CandidateCause("time_sync", None, shelf.load("effects", "time_sync"))

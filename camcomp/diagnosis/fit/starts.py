@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from camcomp.diagnosis.fit.bench import Bench
 
 Nuisance = tuple[str, float, list[Floats]]  # name, size, column (n, c) per run
-STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before its play is taken up
-STOOD_MM, STOOD_RAD = 5e-3, 5e-6  # by which it may have moved and stands: a digit of its encoder
+STARTED_MM = 0.1  # by which an actuator has to move before its play is taken up
+STOOD_MM = 5e-3  # by which it may have moved and stands: a digit of its encoder
 UNDER_WAY = 8  # rows from the one to the other, in which its state is unknown
-START_MM, START_RAD = 0.1, 5e-5  # where its carriage may stand until then: play and guides as bad as they come
-START_N, START_NMM = 1000.0, 1e6  # and how hard its guide may hold it there
-ALWAYS_MM, ALWAYS_RAD = 0.005, 5e-6  # the same where it hardly ever moves: small, or all of its rows would be unknown
+START_MM = 0.1  # where its carriage may stand until then: play and guides as bad as they come
+START_N = 1000.0  # and how hard its guide may hold it there
+ALWAYS_MM = 0.005  # the same where it hardly ever moves: small, or all of its rows would be unknown
 ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
 STARTING_ROWS = 2
 SWING_S = 0.03  # times the speed with which a log begins: how far a loop may then stand from where it is told
@@ -41,20 +41,19 @@ def start_columns(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> 
         if not run.run_path.ordered:
             continue
         for j, a in enumerate(bench.actuators):
-            revolute = bench.twin.robot.actuators[j].revolute
-            still = _standing(run.run_path.row_rho[:, j], revolute)[0]
+            lever = bench.levers[j]
+            still = _standing(lever * run.run_path.row_rho[:, j])[0]
             if still.sum() < STARTING_ROWS:
                 continue
             shift = np.zeros_like(bench.observed(r))
             shift[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
             begins = still.mean() < 1.0 - ALWAYS
-            width = (START_RAD if revolute else START_MM) if begins else (ALWAYS_RAD if revolute else ALWAYS_MM)
-            found.append((f"start.{run.name}.{a}", width, only(r, shift)))
+            width = START_MM if begins else ALWAYS_MM
+            found.append((f"start.{run.name}.{a}", width / lever, only(r, shift)))
             if begins and run.measured.has("drive"):
                 held = np.zeros_like(shift)
                 held[:, 3 + m + j] = still
-                holding = START_NMM if revolute else START_N
-                found.append((f"held.{run.name}.{a}", holding, only(r, held)))
+                found.append((f"held.{run.name}.{a}", START_N * lever, only(r, held)))
     return found
 
 
@@ -72,19 +71,19 @@ def unknown_starts(bench: Bench, k: int) -> Floats:
     behind = np.flatnonzero(missing_rows(path.time)) + 1
     behind = behind[behind < len(path.time) - 1]
     for j in range(m):
-        revolute = bench.twin.robot.actuators[j].revolute
-        rho = path.row_rho[:, j]
+        lever = bench.levers[j]
+        rho = lever * path.row_rho[:, j]
         turned = behind[(rho[behind] - rho[behind - 1]) * (rho[behind + 1] - rho[behind]) <= 0.0]
         rows: list[int] = []
         for i in (0, *turned):
-            standing, under_way = _standing(rho[i:], revolute)
+            standing, under_way = _standing(rho[i:])
             short = standing.sum() < STARTING_ROWS
             rows += [i] if short else []
             rows += (i + np.flatnonzero(under_way)).tolist() if short or i == 0 else []
         unknown = np.zeros(len(path.time))
-        unknown[rows] = START_RAD if revolute else START_MM
+        unknown[rows] = START_MM / lever
         out[:, :3] = np.hypot(out[:, :3], bench.turned(k, bench.row_slopes(k)[:, :, j] * unknown[:, None]))
-        out[rows, 3 + m + j] = START_NMM if revolute else START_N
+        out[rows, 3 + m + j] = START_N * lever
     return out
 
 
@@ -102,15 +101,15 @@ def _swing(time: Floats, rho: Floats) -> Floats:
     return out
 
 
-def _standing(rho: Floats, revolute: bool) -> tuple[Bools, Bools]:
-    """Rows (n,) in which an actuator at rho (n,) has its play not yet taken up: those with one common state, and those on its way.
+def _standing(rho: Floats) -> tuple[Bools, Bools]:
+    """Rows (n,) in which an actuator at rho (n,) mm has its play not yet taken up: those with one common state, and those on its way.
 
     On its way its carriage begins to follow at an unknown point. Where that takes many rows they share one state: the way
     from one to the next is short.
     """
     moved = np.maximum.accumulate(np.abs(rho - rho[0]))
-    still = moved < (STARTED_RAD if revolute else STARTED_MM)
-    under_way = still & (moved > (STOOD_RAD if revolute else STOOD_MM))
+    still = moved < STARTED_MM
+    under_way = still & (moved > STOOD_MM)
     if under_way.sum() > UNDER_WAY:
         under_way = np.zeros(len(rho), bool)
     return np.asarray(still & ~under_way), under_way

@@ -19,14 +19,12 @@ from camcomp.diagnosis.fit.starts import UNDER_WAY, _standing
 )
 def test_rows_that_stand_and_rows_on_the_way(moved_mm, standing, under_way):
     for sign in (1.0, -1.0):
-        found = _standing(-63.0 + sign * np.array(moved_mm), False)
+        found = _standing(-63.0 + sign * np.array(moved_mm))
         assert [np.flatnonzero(each).tolist() for each in found] == [list(standing), list(under_way)]
-    hinge = _standing(1e-3 * np.array(moved_mm), True)
-    assert [np.flatnonzero(each).tolist() for each in hinge] == [list(standing), list(under_way)]
 
 
 def test_what_takes_many_rows_is_told_by_its_length():
     step = 0.099 / np.arange(1, UNDER_WAY + 3)
     for count in (UNDER_WAY, UNDER_WAY + 1):
         rho = np.concatenate([[0.0], step[count - 1] * np.arange(1, count + 1), [0.2]])
-        assert _standing(rho, False)[1].any() == (count == UNDER_WAY)
+        assert _standing(rho)[1].any() == (count == UNDER_WAY)
