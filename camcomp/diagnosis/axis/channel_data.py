@@ -81,6 +81,15 @@ class ChannelData:
         )  # fmt: skip
 
 
+def shrunk(A: Floats, y: Floats, prior: Floats, sd: float) -> tuple[Floats, Floats]:
+    """Amplitudes (k,) of columns (n, k) under a prior of standard deviations (k,), and their covariance (k, k)."""
+    weight = 1.0 / np.maximum(prior, 1e-30)
+    unit = 1.0 / np.sqrt(np.sum((A / sd) ** 2, axis=0) + weight**2 + 1e-60)
+    rows = np.concatenate([A / sd * unit, np.diag(weight * unit)])
+    mean = np.linalg.lstsq(rows, np.concatenate([y / sd, np.zeros(len(unit))]), rcond=1e-9)[0] * unit
+    return mean, np.linalg.pinv(rows.T @ rows, rcond=1e-12, hermitian=True) * np.outer(unit, unit)
+
+
 def healthy_sizes(
     columns: Sequence[Sizes], values: Sequence[Floats], floor: float, noise: Sequence[Floats]
 ) -> tuple[dict[str, Floats], Floats]:
@@ -91,13 +100,8 @@ def healthy_sizes(
     by = np.concatenate([*noise])
     X = np.concatenate([np.concatenate([*own.values()], axis=1) for own in columns]) / by[:, None]
     y = np.concatenate([*values]) / by
-    rms = np.sqrt(np.mean(X**2, axis=0))
-    scale = np.where(rms > 0.0, rms, 1.0)  # columns of zeros keep their prior
-    X = X / scale
-    left = y - X @ np.linalg.lstsq(X, y, rcond=1e-9)[0]
-    sd = noise_of(left, floor)
-    prior = max(HEALTHY_SHARE * float(np.sqrt(np.mean(y**2))), 1e-6 * sd)
-    inverse = np.linalg.inv(X.T @ X / sd**2 + np.eye(X.shape[1]) / prior**2)
-    mean = inverse @ (X.T @ y) / sd**2 / scale
+    size = np.sqrt(np.mean(X**2, axis=0)) + 1e-300
+    sd = noise_of(y - X / size @ np.linalg.lstsq(X / size, y, rcond=1e-9)[0], floor)
+    mean, covariance = shrunk(X, y, max(HEALTHY_SHARE * float(np.sqrt(np.mean(y**2))), 1e-6 * sd) / size, sd)
     ends = np.cumsum([own.shape[1] for own in columns[0].values()])[:-1]
-    return dict(zip(columns[0], np.split(mean, ends), strict=True)), inverse / np.outer(scale, scale)
+    return dict(zip(columns[0], np.split(mean, ends), strict=True)), covariance

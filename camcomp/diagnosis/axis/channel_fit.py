@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.axis.channel_data import ChannelData
+from camcomp.diagnosis.axis.channel_data import ChannelData, shrunk
 from camcomp.diagnosis.axis.effect_columns import AxisCause
 from camcomp.diagnosis.axis.gate import KNOWN
 from camcomp.diagnosis.axis.row_noise import noise_of
@@ -214,8 +214,8 @@ def _jointly(
         rows[k], values[k] = np.concatenate(own, axis=1), data.values[k] - here
     healthy, amplitudes = np.concatenate([*data.scales.values()]), sum(len(at[i]) for i in members)
     prior = np.concatenate([healthy, np.full(amplitudes, np.inf), np.full(len(names), SHAPE_SD), np.ones(len(others))])
-    mean, spread = _shrunk(data.in_floors(rows), data.in_floors(values), prior, sd)
-    return mean[len(healthy) :], spread[len(healthy) :]
+    mean, covariance = shrunk(data.in_floors(rows), data.in_floors(values), prior, sd)
+    return mean[len(healthy) :], np.sqrt(np.maximum(np.diag(covariance)[len(healthy) :], 0.0))
 
 
 def _misfit(
@@ -226,18 +226,8 @@ def _misfit(
     A = data.in_floors({k: data.healthy_columns(k) for k in data.train})
     y = data.in_floors({k: data.values[k] - data.response(k, acting) for k in data.train})
     prior = np.concatenate([*data.scales.values()])
-    c, _ = _shrunk(A, y, prior, sd)
+    c, _ = shrunk(A, y, prior, sd)
     return float(np.sum((y - A @ c) ** 2) + sd**2 * np.sum((c / np.maximum(prior, 1e-30)) ** 2))
-
-
-def _shrunk(A: Floats, y: Floats, prior: Floats, sd: float) -> tuple[Floats, Floats]:
-    """Amplitudes (k,) of columns (n, k) under a prior of standard deviations (k,), and their own standard deviations (k,)."""
-    weight = 1.0 / np.maximum(prior, 1e-30)
-    unit = 1.0 / np.sqrt(np.sum((A / sd) ** 2, axis=0) + weight**2 + 1e-60)
-    rows = np.concatenate([A / sd * unit, np.diag(weight * unit)])
-    mean = np.linalg.lstsq(rows, np.concatenate([y / sd, np.zeros(len(unit))]), rcond=1e-9)[0] * unit
-    spread = unit * np.sqrt(np.maximum(np.diag(np.linalg.pinv(rows.T @ rows, rcond=1e-12, hermitian=True)), 0.0))
-    return np.asarray(mean, float), np.asarray(spread, float)
 
 
 def _noise(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> float:
@@ -365,22 +355,16 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     drivers, hints = ({n: _share_of(linear, n, train, sd) for n, gain in each.items() if gain > 0.0} for each in gains)
     return ChannelFit(
         causes=tuple(causes), acting=tuple(acting), sizes=sizes, covariance=among, left=left, drivers=drivers,
-        hints=hints, columns=_design(linear), imitated=_imitated(data, linear, effects, left=train, gains=gains[1], sd=sd),
+        hints=hints, columns=_design(linear), imitated=_imitated(data, linear, effects, train, sd),
     )  # fmt: skip
 
 
 def _imitated(
-    data: ChannelData, linear: _Linear, effects: Mapping[int, Floats], *, left: Sequence[Floats],
-    gains: Mapping[str, float], sd: float,
-) -> tuple[float, ...]:  # fmt: skip
+    data: ChannelData, linear: _Linear, effects: Mapping[int, Floats], left: Sequence[Floats], sd: float
+) -> tuple[float, ...]:
     """Probabilities of causes with effects (n,), jointly with the excess of residuals (n,) of the fitted runs over the floor."""
     excess = float(np.sqrt(max(float(np.mean(np.concatenate(left) ** 2)) - data.floor**2, 0.0)))
-    functions = {
-        name: (
-            gains.get(name, 0.0), np.concatenate([smooth_functions(data.covariates[k][name], *ends) for k in data.train])
-        )
-        for name, ends in _ends(data).items()
-    }  # fmt: skip
+    functions = np.concatenate([_functions(data, k) for k in data.train])
     return tuple(
         probability_with_unmodelled(
             effect, _design(linear, i), functions, excess=excess, floor=data.floor, noise=sd,
@@ -388,6 +372,12 @@ def _imitated(
         )
         for i, effect in effects.items()
     )  # fmt: skip
+
+
+def _functions(data: ChannelData, k: int) -> Floats:
+    """Functions (n, q) of all covariates of a run."""
+    each = [smooth_functions(data.covariates[k][name], *ends) for name, ends in _ends(data).items()]
+    return np.hstack([np.zeros((len(data.values[k]), 0)), *each])
 
 
 def _prior_odds(found: Explanation, i: int) -> float:
@@ -414,12 +404,8 @@ def _gains_of_functions(
     """Log Bayes factor of a function of every covariate for the residual (n,), priors included, and the same where the
     noise is what these functions leave.
     """
-    found, model, ends = linear.found, linear.model, _ends(data)
-    functions = {
-        k: np.hstack([np.zeros((len(left[k]), 0)), *(smooth_functions(data.covariates[k][n], *ends[n]) for n in ends)])
-        for k in data.train
-    }
-    y, B = data.in_floors(dict(enumerate(left))), data.in_floors(functions)
+    found, model = linear.found, linear.model
+    y, B = data.in_floors(dict(enumerate(left))), data.in_floors({k: _functions(data, k) for k in data.train})
     rest = noise_of(y - B @ np.linalg.lstsq(B, y, rcond=1e-9)[0], data.floor)
     out = []
     for factor in (1.0, min(rest / sd, 1.0)):

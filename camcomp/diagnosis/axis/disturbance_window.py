@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from camcomp.diagnosis.model.window import best_window
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 
 CELL_S = 0.02  # in which a window begins and ends, before it is placed to a row
 SHORTEST_S = 0.2  # of a window
@@ -34,18 +34,21 @@ def find_window(
     beside: columns (n, k) that are fitted to the same runs, so that friction and inertia have no part in how long it lasts.
     """
     rests, bases = _projected(values, beside)
-    best = 0.0, 0, 0, 0, 1
-    for k, rest in rests.items():
-        step = float(np.median(np.diff(times[k])))
-        cell = max(round(CELL_S / step), 1, len(rest) // 400)
-        edges, shortest = np.arange(0, len(rest) - cell + 1, cell), cell * max(round(SHORTEST_S / (cell * step)), 2)
-        score, first, last = best_window(np.ones((len(rest), 1)), rest[:, None], bases[k][:, None], edges, shortest)
-        best = max(best, (score, k, first, last, cell))
-    score, k, first, last, cell = best
-    if not score > 0.0:
+
+    def best(k: int, edges: Ints, shortest: int) -> tuple[float, int, int]:
+        return best_window(np.ones((len(rests[k]), 1)), rests[k][:, None], bases[k][:, None], edges, shortest)
+
+    cells = {
+        k: max(round(CELL_S / float(np.median(np.diff(times[k])))), 1, len(rest) // 400) for k, rest in rests.items()
+    }
+    rows = {k: max(round(SHORTEST_S / float(np.median(np.diff(times[k])))), 2) for k in rests}
+    coarse = {k: best(k, np.arange(0, len(rest) - cells[k] + 1, cells[k]), rows[k]) for k, rest in rests.items()}
+    k = max(coarse, key=lambda each: coarse[each][0])
+    if not coarse[k][0] > 0.0:
         return None
-    first, last = _placed(_with_shift(rests[k], bases[k], first, last), first, last, FARTHEST * cell)
-    return Window(k, first, last) if times[k][last - 1] - times[k][first] >= SHORTEST_S else None
+    near = np.arange(-FARTHEST * cells[k], FARTHEST * cells[k] + 1)
+    edges = np.unique(np.clip([end + near for end in coarse[k][1:]], 0, len(rests[k])))
+    return Window(k, *best(k, edges, rows[k])[1:])
 
 
 def _projected(
@@ -63,29 +66,7 @@ def _projected(
     return rests, bases
 
 
-def _with_shift(rest: Floats, base: Floats, first: int, last: int) -> Floats:
-    """A run (n,) minus the part of a basis (n, k) that is fitted jointly with a shift in a window."""
-    inside = base[first:last].sum(axis=0)
-    shift = float(rest[first:last].sum() / max(last - first - float(inside @ inside), 1e-300))
-    return np.asarray(rest + shift * (base @ inside))
-
-
 def rising(push: Floats, time: Floats, rise_s: float) -> Floats:
     """What a force (n,) N in a window is not known to where it comes and goes, row by row: half of what it changes by."""
     reach = 2 * max(round(rise_s / float(np.median(np.diff(time)))), 1) + 1
     return np.asarray(0.5 * (maximum_filter1d(push, reach) - minimum_filter1d(push, reach)))
-
-
-def _placed(rest: Floats, first: int, last: int, reach: int) -> tuple[int, int]:
-    """Both ends moved by up to `reach` rows to where the step is."""
-
-    def step_at(near: int) -> int:
-        low, high = max(near - reach, 1), min(near + reach, len(rest) - 1)
-        a, b = max(low - reach, 0), min(high + reach, len(rest))
-        cuts = np.arange(low, high + 1)
-        sums = np.concatenate([[0.0], np.cumsum(rest[a:b])])
-        n, m = cuts - a, b - cuts
-        before, behind = sums[cuts - a] / n, (sums[-1] - sums[cuts - a]) / np.maximum(m, 1)
-        return int(cuts[np.argmax((before - behind) ** 2 * n * m)])
-
-    return (step_at(first) if first > 0 else 0), step_at(last)

@@ -22,7 +22,7 @@ from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel
 from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun, ChannelRun
-from camcomp.diagnosis.axis.gate import WITHIN, judge, not_known
+from camcomp.diagnosis.axis.gate import WITHIN, AxisGate, judge, not_known
 from camcomp.diagnosis.axis.row_noise import log_gain
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.axis.terms import AxisTravel, ripple
@@ -108,6 +108,12 @@ def study_channel(
         kept = {n: on for n, on in known.items() if on.any() and not on.all()}
         channel.runs = [r.of(kept[r.number]) if r.number in kept else r for r in channel.runs]
     _tell(found, rows, done, data.healthy)
+    if (
+        rows.channel != "force" and float(np.std(channel.rows)) <= rows.floor
+    ):  # there is no gap that causes would explain
+        channel.gate, channel.runs = AxisGate("at", 0.0, ()), [replace(r, left=r.gap) for r in channel.runs]
+        found.laws = [] if following else found.laws
+        return found, channel
     if rows.channel == "force" and not rows.runs[0].revolute:
         _find_ripple(found, channel)
     if channel.gate is not None and channel.gate.word == "open" and done.drivers:

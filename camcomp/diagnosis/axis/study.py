@@ -17,7 +17,6 @@ import numpy as np
 
 from camcomp.diagnosis.axis import answer
 from camcomp.diagnosis.axis.findings import ROWS, AxisDeviation, AxisFindings, AxisRun
-from camcomp.diagnosis.axis.gate import AxisGate
 from camcomp.diagnosis.axis.joint import JointRows, study_channel
 from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
@@ -117,27 +116,11 @@ def _every_axis(
         for name, runs in steps
     ]
     for a in found:
-        _nothing_below_the_floor(a)
         if a.strange:
             p = [min(c.probability, a.imitated.get(c.effect, 1.0)) for c in a.causes]
             both = zip(a.causes, p, strict=True)
             a.causes = [c.model_copy(update={"probability": with_discrepancy(own)}) for c, own in both]
     return found
-
-
-def _nothing_below_the_floor(axis: AxisFindings) -> None:
-    """Drops causes and unknowns of a following error that is at its floor: there is no gap that they would explain."""
-    following = axis.following
-    if following is None or following.gate is None:
-        return
-    if float(np.std(following.rows)) > following.floor:
-        return
-    axis.causes = [c for c in axis.causes if not c.effect.startswith(("servo_", "speed_limit"))]
-    following.gate = AxisGate("at", 0.0, ())
-    if axis.laws:  # the machine file has none of them, and nothing of the gap is claimed
-        axis.laws, following.runs = [], [replace(r, left=r.gap) for r in following.runs]
-    if axis.force is None and axis.behind is None:
-        axis.unknown_in, axis.law = [], None
 
 
 def _verdict(found: Sequence[AxisFindings]) -> Word:
@@ -269,12 +252,7 @@ def _second_encoder(found: AxisFindings, task: AxisTask) -> AxisFindings:
         moves, values, channel="behind", floor=floor, stated=stated is not None, runs=runs, train=train, test=test,
         numbers=every,
     )  # fmt: skip
-    more, channel = study_channel(found, rows, task.around, task.without)
-    if float(np.std(channel.rows)) > floor:
-        found = more
-    else:  # there is no gap that causes would explain
-        channel.gate = AxisGate("at", 0.0, ())
-    found.behind = channel
+    found, found.behind = study_channel(found, rows, task.around, task.without)
     return found
 
 

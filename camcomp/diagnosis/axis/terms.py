@@ -126,8 +126,8 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
 def _lines(x: Floats, y: Floats, weight: Floats, frequency: Floats) -> np.ndarray:
     """Weighted Fourier sums (f,) of y (n,) at places x (n,), frequencies evenly apart; weight (n,): the way of every row."""
     turn, further = np.exp(-2j * np.pi * frequency[0] * x), np.exp(-2j * np.pi * float(np.ptp(frequency[:2])) * x)
-    out = np.empty(len(frequency), complex)
+    out, own = np.empty(len(frequency), complex), weight * y
     for k in range(len(frequency)):
-        out[k] = turn @ (weight * y)
+        out[k] = turn @ own
         turn = turn * further
     return out
