@@ -43,7 +43,6 @@ class ChannelFit:
 
     acting: the causes with their amplitudes. columns (n, k): of these and the healthy sizes, of the fitted runs. drivers: covariate of the dictionary that is more likely than not ->
     share of the residual's energy. hints: the same, where nothing but such functions makes rows of the residual alike.
-    imitated: probability of every cause where the residual shows something unmodelled.
     """
 
     causes: tuple[FoundCause, ...]
@@ -54,7 +53,6 @@ class ChannelFit:
     columns: Floats
     drivers: Mapping[str, float]
     hints: Mapping[str, float]
-    imitated: tuple[float, ...] = ()
 
     def combined(self, weights: Mapping[str, Sequence[float]]) -> Estimate:
         """A sum of healthy sizes, by kind, with its 95 % interval."""
@@ -330,7 +328,7 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     left, amount, sizes = _left(data, terms, linear)
     spreads = _spreads_of_shapes(data, terms, linear, amount, sd)
     scale = calibration_of("axes")
-    causes, acting, effects = [], [], dict[int, Floats]()
+    causes, acting, train = [], [], [left[k] for k in data.train]
     whole = sum(float(np.sum((data.values[k] - data.level) ** 2)) for k in data.train)
     for i in found.members:
         term, columns = terms[i], list(model.candidates[i].columns)
@@ -341,36 +339,31 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
         rest = sum(float(np.sum(left[k] ** 2)) for k in data.train)
         half = 1.96 * scale.interval * np.sqrt(np.diag(covariance)[columns]) + KNOWN * np.abs(amount[i])
         acting.append((term, amount[i]))
-        effects[i] = np.concatenate(own)
+        sure = _no_imitation(data, linear, i, effect=np.concatenate(own), left=np.concatenate(train), sd=sd)
         causes.append(
             FoundCause(
                 effect=term.effect, target=term.target,
-                probability=scale.calibrate(found.places[term.place]),
+                probability=scale.calibrate(min(found.places[term.place], sure)),
                 share=round(min(max((less - rest) / max(whole, 1e-300), 0.0), 1.0), 4),
                 parameters=_parameters(term, amount[i], half, spreads.get(i, {})),
             )
         )  # fmt: skip
-    train = [left[k] for k in data.train]
     gains = _gains_of_functions(data, linear, left, sd)
     drivers, hints = ({n: _share_of(linear, n, train, sd) for n, gain in each.items() if gain > 0.0} for each in gains)
     return ChannelFit(
         causes=tuple(causes), acting=tuple(acting), sizes=sizes, covariance=among, left=left, drivers=drivers,
-        hints=hints, columns=_design(linear), imitated=_imitated(data, linear, effects, train, sd),
+        hints=hints, columns=_design(linear),
     )  # fmt: skip
 
 
-def _imitated(
-    data: ChannelData, linear: _Linear, effects: Mapping[int, Floats], left: Sequence[Floats], sd: float
-) -> tuple[float, ...]:
-    """Probabilities of causes with effects (n,), jointly with the excess of residuals (n,) of the fitted runs over the floor."""
-    excess = float(np.sqrt(max(float(np.mean(np.concatenate(left) ** 2)) - data.floor**2, 0.0)))
-    functions = np.concatenate([_functions(data, k) for k in data.train])
-    return tuple(
-        probability_with_unmodelled(
-            effect, _design(linear, i), functions, excess=excess, floor=data.floor, noise=sd,
-            odds=_prior_odds(linear.found, i),
-        )
-        for i, effect in effects.items()
+def _no_imitation(data: ChannelData, linear: _Linear, i: int, effect: Floats, left: Floats, sd: float) -> float:
+    """Probability of a member with an effect (n,), given the excess of the residual (n,) over the floor, which it may imitate."""
+    found = linear.found
+    others = tuple(j for j in found.members if j != i)
+    return probability_with_unmodelled(
+        effect, _design(linear, i), np.concatenate([_functions(data, k) for k in data.train]),
+        excess=float(np.sqrt(max(float(np.mean(left**2)) - data.floor**2, 0.0))), floor=data.floor, noise=sd,
+        odds=found.data.prior(found.members) - found.data.prior(others),
     )  # fmt: skip
 
 
@@ -378,12 +371,6 @@ def _functions(data: ChannelData, k: int) -> Floats:
     """Functions (n, q) of all covariates of a run."""
     each = [smooth_functions(data.covariates[k][name], *ends) for name, ends in _ends(data).items()]
     return np.hstack([np.zeros((len(data.values[k]), 0)), *each])
-
-
-def _prior_odds(found: Explanation, i: int) -> float:
-    """Log prior odds of a member of the most probable set."""
-    others = tuple(j for j in found.members if j != i)
-    return found.data.prior(found.members) - found.data.prior(others)
 
 
 def _design(linear: _Linear, without: int | None = None) -> Floats:

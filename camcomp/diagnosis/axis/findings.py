@@ -237,7 +237,6 @@ class AxisFindings:
     revolute: bool = False
     wide: int = WIDE[0]
     causes: list[FoundCause] = field(default_factory=list)
-    imitated: dict[str, float] = field(default_factory=dict)  # effect -> probability beside something unmodelled
     following: AxisChannel | None = None
     force: AxisChannel | None = None
     behind: AxisChannel | None = None
@@ -252,7 +251,7 @@ class AxisFindings:
     def copied(self) -> AxisFindings:
         """The findings with lists of their own."""
         return replace(
-            self, causes=[*self.causes], unknown_in=[*self.unknown_in], imitated={**self.imitated}, details={**self.details},
+            self, causes=[*self.causes], unknown_in=[*self.unknown_in], details={**self.details},
         )  # fmt: skip
 
     @property

@@ -123,7 +123,6 @@ def study_channel(
         if channel.gate.word == "above":
             found.unknown_in += sorted((done.drivers or done.hints).items(), key=lambda each: -each[1])
     found.causes += done.causes
-    found.imitated |= {c.effect: p for c, p in zip(done.causes, done.imitated, strict=False)}
     return found, channel
 
 

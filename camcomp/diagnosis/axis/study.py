@@ -117,9 +117,7 @@ def _every_axis(
     ]
     for a in found:
         if a.strange:
-            p = [min(c.probability, a.imitated.get(c.effect, 1.0)) for c in a.causes]
-            both = zip(a.causes, p, strict=True)
-            a.causes = [c.model_copy(update={"probability": with_discrepancy(own)}) for c, own in both]
+            a.causes = [c.model_copy(update={"probability": with_discrepancy(c.probability)}) for c in a.causes]
     return found
 
 
