@@ -6,7 +6,6 @@ answer on runs it has not seen.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -113,7 +112,7 @@ def diagnose(
         verdict=word, gap=GapSize(**gap), where=_where(problem, found, best, law),
         causes=_causes(stands, found, best, law),
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
-        shrinkage=UnseenShrinkage.model_validate(shrinkage) if unseen else None,
+        shrinkage=shrinkage if unseen else None,
         next_experiment=_proposed(proposal) if proposal is not None else None, minor=minor_effects(stands, best),
         outliers=outlying_rows(problem), floor=Floor(um=gap["noise_floor_um"], source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
@@ -345,7 +344,7 @@ def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[SpectralLine]
 
 def _shrinkage(
     twin: Twin, runs: Sequence[Run], holdout: Sequence[str], problem: Problem, best: Fitted, found: CauseSearch | None
-) -> dict[str, Any]:
+) -> UnseenShrinkage:
     """Named runs are judged with the answer of the others; without names every run is held out once, from the choice among the
     sets that were found, too, where the problem is still theirs.
     """

@@ -3,16 +3,16 @@ re-fitted.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
+from camcomp.diagnosis.answer.unseen import JudgedRun, unseen_shrinkage
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, thinned
 from camcomp.diagnosis.fit.columns import candidate_columns
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.result.types import UnseenShrinkage
 from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.shrinkage import shrinkage
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
@@ -29,7 +29,7 @@ def shrinkage_of(
     order: Sequence[int],
     part: slice,
     floor_um: float,
-) -> dict[str, Any]:
+) -> UnseenShrinkage:
     """The `shrinkage` of the result. seen: the held-out runs; chosen: per run the causes by candidate, chosen and fitted without
     it; order: of the members; part: the channels of the gap.
     """
@@ -42,25 +42,14 @@ def shrinkage_of(
         return [_square(gap) for gap in _without([seen.gap(k, each)[:, part] for k, each in enumerate(these)], free)]
 
     per_step = [squares(count) for count in range(len(members) + 1)]
-    whole = shrinkage(per_step[0], per_step[-1])
-    steps = []
-    for count, i in enumerate(members, start=1):
-        candidate = problem.columns.candidates[i]
-        rms = shrinkage(per_step[0], per_step[count]).after
-        steps.append({"effect": candidate.name, "target": candidate.target, "after_rms_um": round(rms, 3)})
-    ceiling = _ceiling(problem, best, seen, part, free)
-    return {
-        "holdout": [run.name for run in seen.runs],
-        "before_rms_um": round(whole.before, 3),
-        "after_rms_um": round(whole.after, 3),
-        "ratio": round(whole.ratio, 4),
-        "ci95": [round(whole.low, 4), round(whole.high, 4)],
-        "steps": steps,
-        "noise_floor_um": round(floor_um, 3),
-        "ceiling_rms_um": round(ceiling, 3),
-        "ceiling_ratio": round(1.0 - ceiling / whole.before, 4) if whole.before > 0 else 0.0,
-        "refitted": named,
-    }
+    candidates = [problem.columns.candidates[i] for i in members]
+    found = unseen_shrinkage(
+        [JudgedRun(each) for each in zip(*per_step, strict=True)], [(c.name, c.target) for c in candidates],
+        holdout=tuple(run.name for run in seen.runs), noise_floor_um=round(floor_um, 3), refitted=tuple(named),
+    )  # fmt: skip
+    ceiling, before = _ceiling(problem, best, seen, part, free), found.before_rms_um
+    ratio = round(1.0 - ceiling / before, 4) if before > 0 else 0.0
+    return found.model_copy(update={"ceiling_rms_um": round(ceiling, 3), "ceiling_ratio": ratio})
 
 
 def _square(gap: Floats) -> Floats:

@@ -10,29 +10,48 @@ import numpy as np
 
 from camcomp.diagnosis.result.types import ShrinkageStep, UnseenShrinkage
 from camcomp.diagnosis.statistics.shrinkage import log_ratio, of_one_more, scatter
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
 
 PARTS = 16  # regions of postures or stretches of time of a run
 PARTS_OF_ONE = 4  # that a run visits, at least: it differs from the next one by as much as means of these
+USUAL_SPREAD = 0.3  # by which runs of programs differ in the logarithm of the ratio: some cut, some hardly move an axis
+USUAL_RUNS = 2  # that this is worth beside those at hand
 
 
 @dataclass(frozen=True, eq=False)
 class JudgedRun:
-    """Squares (n,) of the rows of a run after 0, 1, ... causes, and the part (n,) of the run that every row lies in."""
+    """Squares (n,) of the rows of a run after 0, 1, ... causes, NaN where a row has no value.
+
+    parts (n,): number of the part of the run that every row lies in; None where runs differ by what they do.
+    """
 
     squares: Sequence[Floats]
-    parts: Ints
+    parts: Ints | None = None
+
+    @property
+    def known(self) -> Bools:
+        """Rows (n,) with a value."""
+        return np.asarray(np.all(np.isfinite(self.squares), axis=0))
+
+    def of(self, rows: Bools) -> JudgedRun:
+        """Some of the rows (n,)."""
+        return JudgedRun([s[rows] for s in self.squares], None if self.parts is None else self.parts[rows])
+
+    @property
+    def log_ratio(self) -> float:
+        """Logarithm of the ratio of the rms without and with all causes."""
+        return log_ratio(float(self.squares[0].mean()), float(self.squares[-1].mean()))
 
 
 def unseen_shrinkage(
     runs: Sequence[JudgedRun], causes: Sequence[tuple[str, str | None]], **more: Any
 ) -> UnseenShrinkage:
-    """The shrinkage over runs that weigh alike; causes: effect and target in the order of the squares. more: other fields."""
-    size = [
-        1e3 * float(np.sqrt(np.mean([s.mean() for s in each]))) for each in zip(*(r.squares for r in runs), strict=True)
-    ]
+    """The shrinkage over all rows; causes: effect and target in the order of the squares. more: other fields."""
+    runs = [r.of(r.known) for r in runs if r.known.any()]
+    stages = [np.concatenate(each) for each in zip(*(r.squares for r in runs), strict=True)]
+    size = [1e3 * float(np.sqrt(each.mean())) for each in stages] or [0.0] * (len(causes) + 1)
     ratio = 1.0 - size[-1] / size[0] if size[0] > 0.0 else 0.0
-    low, high = interval_of_next(runs)
+    low, high = interval_of_next(runs) if runs else (0.0, 0.0)
     return UnseenShrinkage(
         before_rms_um=round(size[0], 3), after_rms_um=round(size[-1], 3), ratio=round(ratio, 4),
         ci95=(round(min(low, ratio), 4), round(max(high, ratio), 4)),
@@ -47,16 +66,17 @@ def unseen_shrinkage(
 def interval_of_next(runs: Sequence[JudgedRun]) -> tuple[float, float]:
     """95 % interval of the shrinkage of one more run.
 
-    Logarithms of the ratio are taken as normal. They vary from run to run as they do between these, and as means over
-    PARTS_OF_ONE parts of a run do. Student's t, the spread pooled over both.
+    Logarithms of the ratio are taken as normal. They vary from run to run as they do between these and, pooled with that,
+    as means over PARTS_OF_ONE parts of a run do, or as runs usually do. Student's t. A cause that is real makes no run
+    worse: the interval ends at 0 unless a run at hand got worse.
     """
-    each = np.array([_ratio(r, np.ones(len(r.parts), bool)) for r in runs])
-    square, freedom = scatter(each)
+    each = np.array([r.log_ratio for r in runs])
+    square, freedom = map(float, scatter(each))
     for r in runs:
-        inside, parts = scatter(np.array([_ratio(r, r.parts == part) for part in np.unique(r.parts)]))
-        square, freedom = square + inside / PARTS_OF_ONE, freedom + parts
-    return of_one_more(float(each.mean()), square, freedom, 1.0 + 1.0 / len(each))
-
-
-def _ratio(run: JudgedRun, rows: np.ndarray) -> float:
-    return log_ratio(float(run.squares[0][rows].mean()), float(run.squares[-1][rows].mean()))
+        if r.parts is None:
+            square, freedom = square + USUAL_RUNS * USUAL_SPREAD**2 / len(runs), freedom + USUAL_RUNS / len(runs)
+        else:
+            inside, parts = scatter(np.array([r.of(r.parts == part).log_ratio for part in np.unique(r.parts)]))
+            square, freedom = square + inside / PARTS_OF_ONE, freedom + parts
+    low, high = of_one_more(float(each.mean()), square, freedom, 1.0 + 1.0 / len(each))
+    return max(low, min(0.0, 1.0 - float(np.exp(each.max())))), high

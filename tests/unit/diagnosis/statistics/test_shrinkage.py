@@ -1,9 +1,20 @@
 """The interval of the shrinkage of one more run."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.statistics.shrinkage import of_one_more, scatter, shrinkage
+from camcomp.diagnosis.answer.unseen import JudgedRun, unseen_shrinkage
+from camcomp.diagnosis.statistics.shrinkage import of_one_more, scatter
+
+
+def shrinkage(before, after):
+    """Ratio and ends of its interval of runs with these squares."""
+    found = unseen_shrinkage(
+        [JudgedRun(each) for each in zip(before, after, strict=True)], [("backlash", "x")], holdout=()
+    )
+    return SimpleNamespace(ratio=found.ratio, low=found.ci95[0], high=found.ci95[1], before=found.before_rms_um)
 
 
 def runs(*ratios, rows=100):
@@ -38,7 +49,7 @@ def test_few_runs_that_agree_by_chance_are_no_certainty():
 
 def test_it_ends_at_nothing_unless_a_run_got_worse():
     assert shrinkage(*runs(0.1, 1.0, 0.1)).low == 0.0
-    assert shrinkage(*runs(0.1, 1.1, 0.1)).low == pytest.approx(-0.1)
+    assert shrinkage(*runs(0.1, 1.1, 0.1)).low == pytest.approx(-0.1, abs=1e-4)
 
 
 def test_rows_and_runs_without_a_value_do_not_count():
@@ -46,6 +57,6 @@ def test_rows_and_runs_without_a_value_do_not_count():
     after[1][:50] = np.nan
     after[2][:] = np.nan
     found, plain = shrinkage(before, after), shrinkage(*runs(0.5, 0.5))
-    assert (found.ratio, found.low, found.high) == pytest.approx((plain.ratio, plain.low, plain.high))
+    assert (found.ratio, found.low, found.high) == pytest.approx((plain.ratio, plain.low, plain.high), abs=1e-4)
     nothing = shrinkage([np.full(3, np.nan)], [np.full(3, np.nan)])
     assert (nothing.ratio, nothing.before) == (0.0, 0.0)
