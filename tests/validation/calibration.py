@@ -19,7 +19,7 @@ from unittest import mock
 import numpy as np
 
 import camcomp
-from camcomp.diagnosis.arm.answer import POSES_MAP, UNKNOWN_MAP
+from camcomp.diagnosis.arm.case import POSES_MAP, UNKNOWN_MAP
 from camcomp.diagnosis.model.calibration import MOST_LOG_ODDS, CalibrationMap
 from tests.validation import scoring
 from tests.validation.generators import FOR_GENERATORS
@@ -63,7 +63,7 @@ def _programs(seed: int, folder: Path) -> None:
 
 EITHER = (False, True)
 KINDS = {
-    "poses": Kind(("arm.answer",), ((POSES_MAP, (False,)), (UNKNOWN_MAP, (True,))), _poses),
+    "poses": Kind(("arm.answer", "arm.case"), ((POSES_MAP, (False,)), (UNKNOWN_MAP, (True,))), _poses),
     "axes": Kind(("axis.channel_fit",), (("axes", EITHER),), _axes),
     "programs": Kind(("search.cause_search", "diagnose"), (("programs", EITHER),), _programs),
 }

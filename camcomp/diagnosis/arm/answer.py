@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.special import expit
 from scipy.stats import norm
 
 from camcomp.diagnosis.arm.case import PoseCase
@@ -17,11 +14,9 @@ from camcomp.diagnosis.arm.linear import covariate_of
 from camcomp.diagnosis.arm.noise_floor import TipFloor
 from camcomp.diagnosis.arm.poses import CURVE
 from camcomp.diagnosis.model.calibration import calibration_of
-from camcomp.diagnosis.model.candidates import Place
-from camcomp.diagnosis.model.classes import alternatives_of
 from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
 from camcomp.diagnosis.model.evidence import Background
-from camcomp.diagnosis.model.folds import Excess, without_nuisances
+from camcomp.diagnosis.model.folds import without_nuisances
 from camcomp.diagnosis.model.group import split_regions
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.model.verdict import VerdictInputs, decide
@@ -47,56 +42,6 @@ PLACES = 8  # parts of the workspace
 STRETCHES = 16  # of a campaign's time
 SHORTEST = 12  # poses in a stretch
 MOST_DRIVERS = 6  # that are listed
-POSES_MAP, UNKNOWN_MAP = "poses", "poses beside unknown"  # kinds of log of the calibration
-
-
-@dataclass(frozen=True, eq=False)
-class AnswerInputs:
-    """Inputs of an answer; check: of held-out poses; gaps (n, 3) mm of the fitted campaigns to the arm of the config."""
-
-    case: PoseCase
-    check: Excess | None
-    gaps: Sequence[Floats]
-
-    @property
-    def floor(self) -> TipFloor | None:
-        """The noise floor, None where these poses do not determine it."""
-        return self.case.floor
-
-    @property
-    def unmodelled(self) -> float:
-        """Calibrated probability that something unmodelled acts; unseen poses above their floor decide."""
-        if self.check is not None and self.check.above:
-            return calibration_of(POSES_MAP).calibrate(1.0)
-        return calibration_of(POSES_MAP).calibrate(self.case.explanation.unknown)
-
-    @property
-    def kind(self) -> str:
-        """The calibration map of causes."""
-        return UNKNOWN_MAP if self.unmodelled > EVEN else POSES_MAP
-
-    @property
-    def wide(self) -> float:
-        """Half width of a 95 % interval in standard deviations."""
-        return 1.96 * calibration_of(self.kind).interval
-
-    @cached_property
-    def rest(self) -> list[Floats]:
-        """Residuals (n, 3) mm of the fitted campaigns with the causes, frames fitted."""
-        return [self.case.bench.gap(k, self.case.causes) for k in self.case.bench.own]
-
-    @cached_property
-    def parts(self) -> list[_Part]:
-        """Members of the most probable set, and the targets of its families."""
-        return _parts(self)
-
-    def alternatives(self) -> list[tuple[int, ...]]:
-        """Sets that are indistinguishable by these poses, the best first."""
-        return alternatives_of(self.case.explanation, [c.place for c in self.case.shelf.candidates])
-
-    def places(self, members: Sequence[int]) -> list[Place]:
-        """Effects and targets of candidates."""
-        return [self.case.shelf.candidates[i].place for i in members]
 
 
 def gap(gaps: Sequence[Floats], floor: TipFloor | None) -> GapSize:
@@ -113,124 +58,96 @@ def gap(gaps: Sequence[Floats], floor: TipFloor | None) -> GapSize:
 # -- causes -----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """An effect at a target: its columns and the probability of the posterior."""
-
-    effect: str
-    target: str | None
-    columns: list[int]
-    probability: float
-
-
-def causes(told: AnswerInputs) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]:
+def causes(case: PoseCase) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]:
     """Causes of the most probable set in falling probability, and those too small to be causes."""
-    whole = sum(float((gap**2).sum()) for gap in told.gaps)
-    rows = sum(len(gap) for gap in told.gaps)
+    whole = sum(float((gap**2).sum()) for gap in case.gaps)
+    rows = sum(len(gap) for gap in case.gaps)
     out: list[FoundCause] = []
     minor: list[MinorEffect] = []
-    for part in told.parts:
-        energy = energy_of(told, part.columns)
+    for part in case.parts:
+        energy = energy_of(case, part.columns)
         size = 1e3 * float(np.sqrt(energy / rows))
-        if told.floor is not None and size < MINOR * told.floor.um:
-            if size >= MIN_LISTED_FLOORS * told.floor.um:
+        if case.floor is not None and size < MINOR * case.floor.um:
+            if size >= MIN_LISTED_FLOORS * case.floor.um:
                 minor.append(MinorEffect(effect=part.effect, target=part.target, size_um=_round(size)))
             continue
         cause = FoundCause(
             effect=part.effect,
             target=part.target,
-            probability=calibration_of(told.kind).calibrate(part.probability),
+            probability=calibration_of(case.kind).calibrate(part.probability),
             share=round(min(energy / whole, 1.0), 4),
-            parameters=parameters_of(told, part.columns),
+            parameters=parameters_of(case, part.columns),
         )
         if part.effect == CURVE:
-            on, case = part.columns, told.case
+            on = part.columns
             columns, covariance = [case.shelf.columns[j] for j in on], case.covariance[np.ix_(on, on)]
             cause = curve_cause(
-                case.bench, cause, columns, amount=case.amount[on], covariance=covariance, wide=told.wide
+                case.bench, cause, columns, amount=case.amount[on], covariance=covariance, wide=case.wide
             )
         out.append(cause)
     out.sort(key=lambda c: (-c.probability, -c.share))
     return tuple(out), tuple(minor)
 
 
-def _parts(told: AnswerInputs) -> list[_Part]:
-    found, columns = told.case.explanation, told.case.shelf.columns
-    own = [_Part(c.effect, c.target, list(c.columns), found.places[c.place])
-           for c in (found.model.candidates[i] for i in found.members)]  # fmt: skip
-    for name, _ in found.background.families:
-        on = [j for j in found.model.family(name)[0].tolist() if told.case.amount[j] != 0.0]
-        for target in dict.fromkeys(columns[j].target for j in on):
-            here = [j for j in on if columns[j].target == target]
-            alone = next((p for p in own if (p.effect, p.target) == (name, target)), None)
-            if alone is None:
-                chance = float(expit(found.odds_of(here)))
-                own.append(_Part(name, target, here, found.families[name] * chance))
-            else:
-                alone.columns.extend(j for j in here if j not in alone.columns)
-    return own
-
-
-def energy_of(told: AnswerInputs, on: Sequence[int]) -> float:
+def energy_of(case: PoseCase, on: Sequence[int]) -> float:
     """Sum of squares, mm2, of what columns move the tips by, frames fitted."""
-    case = told.case
     groups = [case.model.groups[k] for k in case.bench.own]
     return sum(float((without_nuisances(g.A[:, :, on] @ case.amount[on], g.N) ** 2).sum()) for g in groups)
 
 
-def parameters_of(told: AnswerInputs, on: Sequence[int]) -> dict[str, Estimate]:
+def parameters_of(case: PoseCase, on: Sequence[int]) -> dict[str, Estimate]:
     """Parameters of columns with their intervals."""
     out = {}
     for j in on:
-        column = told.case.shelf.columns[j]
-        p, spread = column.parameter, told.wide * float(np.sqrt(told.case.covariance[j, j]))
-        low, value, high = (p.value((told.case.amount[j] + s * spread) * p.scale) for s in (-1.0, 0.0, 1.0))
+        column = case.shelf.columns[j]
+        p, spread = column.parameter, case.wide * float(np.sqrt(case.covariance[j, j]))
+        low, value, high = (p.value((case.amount[j] + s * spread) * p.scale) for s in (-1.0, 0.0, 1.0))
         out[p.name] = Estimate.stated(value, low, high)
         for name, shape, first, last in column.shape:
             out[name] = Estimate.stated(shape, first, last)
     return out
 
 
-def verdict(told: AnswerInputs, named: Sequence[FoundCause]) -> Any:
+def verdict(case: PoseCase, named: Sequence[FoundCause]) -> Any:
     """The word of the result."""
-    calibrate = calibration_of(told.kind).calibrate
+    calibrate = calibration_of(case.kind).calibrate
     inputs = VerdictInputs(
-        unknown=told.unmodelled,
-        best=min([_best(told, calibrate), *(c.probability for c in named)]),
-        alternatives=len(told.alternatives()) - 1,
+        unknown=case.unmodelled,
+        best=min([_best(case, calibrate), *(c.probability for c in named)]),
+        alternatives=len(case.alternatives()) - 1,
         causes=len(named),
-        known_noise=told.floor is not None,
-        confirmed=None if told.check is None else told.check.at_floor,
+        known_noise=case.floor is not None,
+        confirmed=None if case.check is None else case.check.at_floor,
     )
     return decide(inputs)
 
 
-def _best(told: AnswerInputs, calibrate: Callable[[float], float]) -> float:
+def _best(case: PoseCase, calibrate: Callable[[float], float]) -> float:
     """Probability that all causes of the best set act; of the empty set, that the most probable cause does not."""
-    found = told.case.explanation
+    found = case.explanation
     if not found.members:
         return 1.0 - calibrate(max(found.places.values(), default=0.0))
-    own = set(told.places(found.members))
-    return calibrate(sum(p for m, p in found.sets if own <= set(told.places(m))))
+    own = set(case.places(found.members))
+    return calibrate(sum(p for m, p in found.sets if own <= set(case.places(m))))
 
 
-def with_unknown(told: AnswerInputs, named: tuple[FoundCause, ...], word: str) -> tuple[FoundCause, ...]:
+def with_unknown(case: PoseCase, named: tuple[FoundCause, ...], word: str) -> tuple[FoundCause, ...]:
     """The causes of a verdict: none for `none`; with the unknown cause where something unmodelled is, or nothing is named."""
     if word == "none":
         return ()
     if word == "unknown" or (word == "ambiguous" and not named):
-        share = round(min(_size(told.rest) ** 2 / _size(told.gaps) ** 2, 1.0), 4)
-        probability = told.unmodelled if word == "unknown" else EVEN
+        share = round(min(_size(case.rest) ** 2 / _size(case.gaps) ** 2, 1.0), 4)
+        probability = case.unmodelled if word == "unknown" else EVEN
         return (*named, UnknownCause(target=None, probability=probability, share=share))
     return named
 
 
-def alternatives(told: AnswerInputs, named: Sequence[FoundCause]) -> tuple[tuple[NamedCause, ...], ...]:
+def alternatives(case: PoseCase, named: Sequence[FoundCause]) -> tuple[tuple[NamedCause, ...], ...]:
     """Sets that are indistinguishable by the poses, the best first; a lone set gets itself plus an unknown effect as
     its rival.
     """
     known = tuple(NamedCause(effect=c.effect, target=c.target) for c in named if not isinstance(c, UnknownCause))
-    others = [tuple(NamedCause(effect=e, target=t) for e, t in told.places(m)) for m in told.alternatives()[1:]]
+    others = [tuple(NamedCause(effect=e, target=t) for e, t in case.places(m)) for m in case.alternatives()[1:]]
     others = [each for each in others if each and known]
     return (known, *(others or [(*known, NamedCause(effect=UNKNOWN, target=None))]))
 
@@ -238,39 +155,38 @@ def alternatives(told: AnswerInputs, named: Sequence[FoundCause]) -> tuple[tuple
 # -- where ------------------------------------------------------------------------------------------------------------
 
 
-def where(told: AnswerInputs, word: str) -> Where:
+def where(case: PoseCase, word: str) -> Where:
     """Shares of axes and actuators; for an unknown cause its covariates, and the intervals and regions above the
     noise.
     """
-    case = told.case
-    energy = (np.concatenate(list(told.gaps)) ** 2).sum(axis=0)
+    energy = (np.concatenate(list(case.gaps)) ** 2).sum(axis=0)
     actuators = dict.fromkeys(case.bench.actuators, 0.0)
     stages: dict[str, float] = {}
-    for part in told.parts:
-        size, stage = energy_of(told, part.columns), case.shelf.columns[part.columns[0]].module.STAGE
+    for part in case.parts:
+        size, stage = energy_of(case, part.columns), case.shelf.columns[part.columns[0]].module.STAGE
         stages[stage] = stages.get(stage, 0.0) + size
         if part.target is not None:
             actuators[part.target] += size
     total = max(sum(actuators.values()), 1e-300)
     most: Any = max(stages, key=lambda s: stages[s]) if stages else "structure"
     whole = max(float(energy.sum()), 1e-300)
-    intervals = _intervals(told) if word == "unknown" else ()
+    intervals = _intervals(case) if word == "unknown" else ()
     return Where(
         stage=most,
         axes={axis: round(float(e) / whole, 4) for axis, e in zip("xyz", energy, strict=True)},
         actuators={name: round(size / total, 4) for name, size in actuators.items()},
-        drivers=drivers(told, intervals) if word == "unknown" else (),
+        drivers=drivers(case, intervals) if word == "unknown" else (),
         intervals=intervals,
-        places=_places_above(told) if word == "unknown" else (),
+        places=_places_above(case) if word == "unknown" else (),
     )
 
 
-def drivers(told: AnswerInputs, intervals: Sequence[IntervalShare]) -> tuple[Driver, ...]:
+def drivers(case: PoseCase, intervals: Sequence[IntervalShare]) -> tuple[Driver, ...]:
     """Covariates of the residual with the share of its energy that each explains alone, the most first.
 
     Where none is clear: time where stretches of it stand out, else the covariate that explains most.
     """
-    case, found = told.case, told.case.explanation
+    found = case.explanation
     plain = Background(found.background.noise, families=found.background.families)
     gains: dict[str, tuple[float, Background]] = {}
     for b, gain in gains_of_more(case.model, plain, found.members).items():
@@ -286,7 +202,7 @@ def drivers(told: AnswerInputs, intervals: Sequence[IntervalShare]) -> tuple[Dri
     shares: dict[str, float] = {}
     before = _energy(residuals(case.model, plain, found.members))
     for name in clear & set(gains):
-        after = _energy_beside(told, gains[name][1])
+        after = _energy_beside(case, gains[name][1])
         key = covariate_of(name)
         shares[key] = max(shares.get(key, 0.0), min(max(1.0 - after / max(before, 1e-300), 0.0), 1.0))
     if found.background.process is not None and found.background.process.over == "time":
@@ -299,9 +215,9 @@ def _energy(parts: Sequence[Floats]) -> float:
     return sum(float((r**2).sum()) for r in parts)
 
 
-def _energy_beside(told: AnswerInputs, background: Background) -> float:
+def _energy_beside(case: PoseCase, background: Background) -> float:
     """Energy of the residual, in floors, with a further covariate fitted."""
-    model, found = told.case.model, told.case.explanation
+    model, found = case.model, case.explanation
     at = model.posterior(background, model.reduced(background).slab(found.members))
     groups = [model.groups[g] for g in model.own]
     return _energy([(g.y - model.layout.design(g) @ at.mean) / g.sd for g in groups])
@@ -331,12 +247,12 @@ def standing_out(size: Floats, groups: Sequence[np.ndarray]) -> list[int]:
     return out
 
 
-def _intervals(told: AnswerInputs) -> tuple[IntervalShare, ...]:
+def _intervals(case: PoseCase) -> tuple[IntervalShare, ...]:
     """Stretches of a run's time in which the residual is larger than elsewhere."""
-    whole = max(_energy(told.rest), 1e-300)
+    whole = max(_energy(case.rest), 1e-300)
     out = []
-    for k, rest in zip(told.case.bench.own, told.rest, strict=True):
-        poses, square = told.case.bench.campaigns[k], (rest**2).sum(axis=1)
+    for k, rest in zip(case.bench.own, case.rest, strict=True):
+        poses, square = case.bench.campaigns[k], (rest**2).sum(axis=1)
         for run in dict.fromkeys(str(name) for name in poses.run) if poses.has_clock else ():
             rows = np.flatnonzero(poses.run == run)
             own = windows(poses.time[rows])
@@ -350,11 +266,11 @@ def _intervals(told: AnswerInputs) -> tuple[IntervalShare, ...]:
     return tuple(sorted(out, key=lambda each: -each.share))
 
 
-def _places_above(told: AnswerInputs) -> tuple[PlaceShare, ...]:
+def _places_above(case: PoseCase) -> tuple[PlaceShare, ...]:
     """Parts of the workspace, boxes in the machine frame, in which the residual is larger than elsewhere."""
-    bench = told.case.bench
+    bench = case.bench
     point = np.concatenate([bench.standing(bench.campaigns[k], ()).hung.point for k in bench.own])
-    square = np.concatenate([(r**2).sum(axis=1) for r in told.rest])
+    square = np.concatenate([(r**2).sum(axis=1) for r in case.rest])
     group = split_regions(point, PLACES)
     parts = [np.flatnonzero(group == g) for g in np.unique(group)]
     whole = max(float(square.sum()), 1e-300)

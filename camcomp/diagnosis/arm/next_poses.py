@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from camcomp.diagnosis.arm.answer import AnswerInputs
+from camcomp.diagnosis.arm.case import PoseCase
 from camcomp.diagnosis.arm.poses import ArmBench, Column, Poses
 from camcomp.diagnosis.model.design import bits, designed
 from camcomp.diagnosis.result.types import UNKNOWN, NextExperiment, PosesToMeasure
@@ -23,13 +23,13 @@ FRAME = 10.0  # prior deviation of the new campaign's frame and target, in mm, a
 POSES_SEED = 20201110  # the same answer twice
 
 
-def next_poses(told: AnswerInputs, word: str) -> NextExperiment | None:
+def next_poses(case: PoseCase, word: str) -> NextExperiment | None:
     """The most informative poses, as a campaign of their own; repeats where the floor is unknown."""
     if word in ("none", "identified"):
         return None
-    case, several = told.case, len(told.case.bench.campaigns) > 1
-    effects = [*dict.fromkeys(p.effect for p in told.parts), UNKNOWN]
-    if told.floor is None and several:
+    several = len(case.bench.campaigns) > 1
+    effects = [*dict.fromkeys(p.effect for p in case.parts), UNKNOWN]
+    if case.floor is None and several:
         return NextExperiment(
             action=f"visit {REPEATS} of the poses once more, other poses in between, so that the floor is known",
             separates=tuple(effects), gain=1.0, poses=_listed(case.bench, _repeats(case.bench.campaigns[0])),
@@ -43,7 +43,7 @@ def next_poses(told: AnswerInputs, word: str) -> NextExperiment | None:
     q, gain = proposed(case.bench, columns, case.covariance[np.ix_(on, on)], max(case.sd, 1e-6))
     poses = _listed(case.bench, q) if len(q) else None
     if not several and columns:
-        return _second_campaign(told, poses, gain)
+        return _second_campaign(case, poses, gain)
     if poses is None:
         return None
     return NextExperiment(
@@ -59,9 +59,9 @@ def next_poses(told: AnswerInputs, word: str) -> NextExperiment | None:
     )  # fmt: skip
 
 
-def _second_campaign(told: AnswerInputs, poses: PosesToMeasure | None, gain: float) -> NextExperiment:
+def _second_campaign(case: PoseCase, poses: PosesToMeasure | None, gain: float) -> NextExperiment:
     """Other postures, where there is one campaign only: within it, effects stand in for each other."""
-    sets = [told.places(m) for m in told.alternatives()]
+    sets = [case.places(m) for m in case.alternatives()]
     names = ["; ".join(e if t is None else f"{e} {t}" for e, t in each) for each in sets if each]
     return NextExperiment(
         action="measure a second campaign in other postures, with a clamping of its own",

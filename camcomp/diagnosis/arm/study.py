@@ -21,7 +21,7 @@ from camcomp.diagnosis.arm.pose_values import of_poses
 from camcomp.diagnosis.arm.poses import ArmBench, Poses, combined
 from camcomp.diagnosis.arm.temporary_offsets import EFFECT as SPELL
 from camcomp.diagnosis.arm.temporary_offsets import temporary_offsets
-from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrinkage, without_far_judged
+from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrinkage
 from camcomp.diagnosis.model.discrepancy import residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.explain import Explanation, KnownNoise, explain
@@ -77,7 +77,7 @@ def solve(
     final = floor.sd if floor else sd * found.background.noise
     return PoseCase(
         bench=bench, shelf=shelf, explanation=found, amount=amount, covariance=covariance, floor=floor, sd=final,
-        outliers=tuple(outliers), loose=loose, notes=notes,
+        outliers=tuple(outliers), loose=loose, notes=notes, every_gap=gaps,
     )  # fmt: skip
 
 
@@ -276,29 +276,26 @@ def studied(
             stated=StatedDeviation() if stated is None else stated,
         )  # fmt: skip
     bench = case.bench
-    gaps = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
-    case = without_far_judged(case)
-    check = check_held_out(case)
+    case = replace(case, check=check_held_out(case))
     progress.done(0.8)
-    told = answer.AnswerInputs(case, check, gaps[: len(bench.own)])
-    named, minor = answer.causes(told)
-    word = answer.verdict(told, named)
-    named = answer.with_unknown(told, named, word)
+    named, minor = answer.causes(case)
+    word = answer.verdict(case, named)
+    named = answer.with_unknown(case, named, word)
     progress.done(0.9)
     names = [
         n for n in dict.fromkeys(str(r.run[0]) for r in runs) if (n in holdout or not holdout) and n not in case.loose
     ]
     known = any(c.effect != UNKNOWN for c in named)
-    alternatives = answer.alternatives(told, named) if word == "ambiguous" or (word == "unknown" and known) else ()
+    alternatives = answer.alternatives(case, named) if word == "ambiguous" or (word == "unknown" and known) else ()
     floor = case.floor
     result = DiagnosisResult(
-        verdict=word, gap=answer.gap(told.gaps, floor), where=answer.where(told, word), causes=named,
+        verdict=word, gap=answer.gap(case.gaps, floor), where=answer.where(case, word), causes=named,
         alternatives=alternatives if word == "ambiguous" or len(alternatives) > 1 else (),
         shrinkage=shrinkage(case, named, sorted(names), bool(holdout)), minor=minor,
-        next_experiment=next_poses(told, word),
+        next_experiment=next_poses(case, word),
         floor=Floor(um=round(floor.um, 3), source=floor.source) if floor else Floor(um=None, source="not identifiable"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(set(case.outliers))),
-        standards=of_poses(robot, bench.campaigns, gaps),
+        standards=of_poses(robot, bench.campaigns, case.every_gap),
     )  # fmt: skip
     return within_floor(result), (
         *case.notes,
