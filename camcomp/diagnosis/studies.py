@@ -7,20 +7,19 @@ no tips) have studies of their own. Everything else goes to the general diagnosi
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from pydantic import ValidationError
 
-from camcomp.diagnosis.arm.noise_floor import StatedDeviation
 from camcomp.diagnosis.arm.plausible import check_poses
 from camcomp.diagnosis.arm.poses import Poses, approached
 from camcomp.diagnosis.arm.study import bench_of
 from camcomp.diagnosis.arm.study import studied as study_arm
 from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
+from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.plausible import check_axes
 from camcomp.diagnosis.axis.predicted import without_effects
 from camcomp.diagnosis.axis.study import studied as study_axes
@@ -28,6 +27,7 @@ from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.experiment.log_checks import check_clock
 from camcomp.diagnosis.experiment.open_experiment import open_log, read_log, unread
 from camcomp.diagnosis.fit.measured import Measured
+from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.diagnosis.residuals import Columns, of_axes, of_poses
 from camcomp.diagnosis.result.types import DiagnosisResult
 from camcomp.ground import shelf
@@ -63,14 +63,13 @@ def study_of(file: str | Path | ExperimentFile, without: Sequence[str] = ()) -> 
     as they are read.
     """
     opened = open_logs(read_experiment(file))
-    logs, robot = opened.logs, opened.robot
+    logs, robot, sd = opened.logs, opened.robot, opened.file.experiment.sd
+    stated = StatedDeviation(**{f.name: getattr(sd, f.name) for f in fields(StatedDeviation)}) if sd else None
     try:
         if all(m.has("tip") and m.has("encoder") and not m.has("setpoint") for m in logs):
             if arm_of(robot) is None:
                 return None
             runs = checked_poses(opened)
-            sd = opened.file.experiment.sd
-            stated = StatedDeviation(sd.tip_mm, sd.encoder_mm) if sd else StatedDeviation()
             own = _causes(opened.file.config)
             holdout = opened.file.experiment.holdout
             result, notes = study_arm(robot, own, runs, holdout=holdout, without=without, stated=stated)
@@ -78,12 +77,8 @@ def study_of(file: str | Path | ExperimentFile, without: Sequence[str] = ()) -> 
             return LogStudy(result, partial(of_poses, bench, result), (*opened.notes, *notes))
         if not any(m.has("tip") for m in logs) and all(m.has("encoder") for m in logs):
             axes = checked_axes(opened)
-            sd = opened.file.experiment.sd
-            deviation = (
-                AxisDeviation(sd.encoder_mm, sd.force_N, sd.encoder_rad, sd.force_Nmm) if sd else AxisDeviation()
-            )
             result, found = study_axes(
-                axes, holdout=opened.file.experiment.holdout, without=without, stated=deviation, robot=robot
+                axes, holdout=opened.file.experiment.holdout, without=without, stated=stated, robot=robot
             )
             by_axis = {a.name: a.revolute for a in robot.actuators}
             return LogStudy(result, partial(of_axes, found, by_axis), (*opened.notes, *_without_masses(opened)))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import yaml
 
-from camcomp.diagnosis.arm.noise_floor import StatedDeviation
 from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.arm.study import studied
+from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
 from tests.validation.poses.arm import ROOT, Off, load_arm

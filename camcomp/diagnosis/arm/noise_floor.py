@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 from scipy.stats import chi2
 
 from camcomp.diagnosis.arm.poses import Poses
-from camcomp.diagnosis.model.noise import resolution_of, rounding_noise
+from camcomp.diagnosis.model.noise import StatedDeviation, resolution_of, rounding_noise
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.description import Robot
 
@@ -52,14 +52,6 @@ def _with_rounding(floor: TipFloor | None, campaigns: Sequence[Poses]) -> TipFlo
         return None
     rounding = rounding_noise(max(resolution(each.tip) for each in campaigns))
     return replace(floor, sd=float(np.hypot(floor.sd, rounding)))
-
-
-@dataclass(frozen=True)
-class StatedDeviation:
-    """Standard deviations of the instruments as the experiment states them, mm per axis; None where unstated."""
-
-    tip: float | None = None
-    encoder: float | None = None
 
 
 def tip_floor(
@@ -103,8 +95,8 @@ def _stated(robot: Robot, campaigns: Sequence[Poses], stated: StatedDeviation) -
     squares = []
     for each in campaigns:
         own = np.full((len(each.q), 3), np.nan) if each.sd is None else each.sd
-        every = np.fmax(own, np.nan if stated.tip is None else stated.tip)
-        squares.append(every**2 + slides / 3.0 * (stated.encoder or 0.0) ** 2)
+        every = np.fmax(own, np.nan if stated.tip_mm is None else stated.tip_mm)
+        squares.append(every**2 + slides / 3.0 * (stated.encoder_mm or 0.0) ** 2)
     whole = np.concatenate(squares)
     return TipFloor(float(np.sqrt(whole.mean())), np.inf, "stated") if np.isfinite(whole).all() else None
 

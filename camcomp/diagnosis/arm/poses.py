@@ -7,7 +7,7 @@ sensor to say. Nothing cuts, so the drives push nothing but the load.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, partial
 from itertools import pairwise
@@ -30,6 +30,9 @@ _SHARE_OF_SCALE = 0.05  # step of a difference
 _SAME_STEP = 1e-6  # times in equal steps of 1 are row numbers
 _JOINT_STEP = 1e-5  # rad or mm
 CURVE = "joint_curve"
+Shape = tuple[
+    tuple[str, float, float, float], ...
+]  # what shapes an effect: name, value, and between which values it lies
 _WRIST = {"joint_coupling": 2}  # effects of the last joints only: of how many
 # Effects of these hooks stand still, or are part of the registration.
 _UNSEEN = ("time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_lag", "backlash", "friction", "none")
@@ -121,7 +124,7 @@ class Column:
     target: str | None
     module: Any
     parameter: Parameter
-    shape: tuple[tuple[str, float, float, float], ...] = ()
+    shape: Shape = ()
 
     def cause(self, amount: float) -> Cause:
         """The cause with this parameter at an amplitude."""
@@ -204,56 +207,36 @@ class ArmBench:
         return self.standing(self.campaigns[k], causes).tips(at)
 
     def columns(self, without: Sequence[str] = ()) -> list[Column]:
-        """Every parameter of the shelf that may move a standing arm, without the waves of joints."""
-        return self._of_effects(shelf.usable("effects", (*_UNSEEN, CURVE, *without)))
-
-    def waves(self, without: Sequence[str] = ()) -> list[Column]:
-        """The waves of every hinge."""
-        return [] if CURVE in without else self._of_effects([(CURVE, shelf.load("effects", CURVE))])
-
-    def shaped(self, without: Sequence[str] = ()) -> list[Column]:
-        """Parameters of drives and links that need an unknown shape (a time of warming up), one column for each value to try."""
+        """Every parameter of the shelf that may move a standing arm, once for each shape of effects of drives and links."""
+        timed = self._warm or all(
+            each.has_clock for each in self.campaigns
+        )  # rows without a clock have no warming curve
         found: list[Column] = []
-        if not self._warm and not all(each.has_clock for each in self.campaigns):
-            return found  # rows without a clock have no warming curve
-        for name, module in shelf.usable("effects", (*_UNSEEN, CURVE, *without)):
-            if not (hasattr(module, "on_drive") or hasattr(module, "on_links")) or module.TARGET == "named":
-                continue
-            targets: list[str | None] = [None] if module.TARGET in ("machine", "either") else []
-            targets += [] if module.TARGET == "machine" else list(self.actuators)
-            targets = [each for each in targets if applies(module, self.robot, each)]
-            for target in targets:
-                turns = self.drive(self.actuators[0] if target is None else target).revolute
-                own = _for(module, turns)
-                found += [
-                    Column(name, target, module, p, shape)
-                    for shape in _shapes(own, self._warm)
-                    for p in own
-                    if not p.shape
-                ]
+        for name, module in shelf.usable("effects", (*_UNSEEN, *without)):
+            for target in self._targets(name, module):
+                own = _for(module, self.drive(target or self.actuators[0]).revolute)
+                shapes: list[Shape] = [()]
+                if scanned := any(p.scan for p in own):
+                    shapes = _shapes(own, self._warm) if timed and _is_of_arm(module) else []
+                found += [Column(name, target, module, p, s) for s in shapes for p in own if not (scanned and p.shape)]
         return found
+
+    def _targets(self, name: str, module: Any) -> list[str | None]:
+        """Where an effect may act on this arm."""
+        stiff = any(a.stiffness is not None for a in self.robot.actuators)
+        missing = name == "drive_stiffness" and not stiff
+        missing |= name == "link_stiffness" and not any(isinstance(e, Link) for e in self.arm.chain.elements)
+        if missing or module.TARGET == "named":  # of axes that arms do not have
+            return []
+        common = module.TARGET == "machine" or (module.TARGET == "either" and any(p.scan for p in module.PARAMETERS))
+        targets: list[str | None] = [None] if common else []
+        targets += [] if module.TARGET == "machine" else list(self.actuators)[-_WRIST.get(name, 0) :]
+        return [each for each in targets if applies(module, self.robot, each)]
 
     @property
     def _warm(self) -> bool:
         """Whether temperatures of all campaigns are known, so that no time of warming up is."""
         return all(each.temperature is not None for each in self.campaigns)
-
-    def _of_effects(self, effects: Iterable[tuple[str, Any]]) -> list[Column]:
-        springs = any(a.stiffness is not None for a in self.robot.actuators)
-        links = any(isinstance(e, Link) for e in self.arm.chain.elements)
-        found: list[Column] = []
-        for name, module in effects:
-            if (name == "drive_stiffness" and not springs) or (name == "link_stiffness" and not links):
-                continue
-            if module.TARGET == "named":  # of axes that arms do not have
-                continue
-            targets: list[str | None] = [None] if module.TARGET == "machine" else list(self.actuators)
-            targets = targets[-_WRIST[name] :] if name in _WRIST else targets
-            for target in (each for each in targets if applies(module, self.robot, each)):
-                turns = target is None or self.drive(target).revolute
-                for p in _parameters(module, turns):
-                    found.append(Column(name, target, module, p))
-        return found
 
     def drive(self, name: str) -> Actuator:
         """The actuator called `name`."""
@@ -407,10 +390,9 @@ def is_of_drive(column: Column) -> bool:
     return signal_path.stages_of(column.module) == {"drive"} and not signal_path.pushes(column.module)
 
 
-def _parameters(module: Any, turns: bool) -> tuple[Parameter, ...]:
-    """The parameters that make sense for a hinge (turns) or a slide; none where a shape has to be scanned."""
-    own = _for(module, turns)
-    return () if any(p.scan for p in own) else own
+def _is_of_arm(module: Any) -> bool:
+    """Whether an effect acts at drives or links."""
+    return hasattr(module, "on_drive") or hasattr(module, "on_links")
 
 
 def _for(module: Any, turns: bool) -> tuple[Parameter, ...]:
@@ -421,7 +403,7 @@ def _for(module: Any, turns: bool) -> tuple[Parameter, ...]:
     return tuple(own)
 
 
-def _shapes(parameters: Sequence[Parameter], warm: bool) -> list[tuple[tuple[str, float, float, float], ...]]:
+def _shapes(parameters: Sequence[Parameter], warm: bool) -> list[Shape]:
     """Shapes to try of an effect: times of warming up, or nothing where temperatures are logged; no shape of what is placed."""
     scanned = [p for p in parameters if p.scan]
     if len(scanned) != 1 or scanned[0].placed or scanned[0].turns:

@@ -16,7 +16,7 @@ from camcomp.diagnosis.arm import answer
 from camcomp.diagnosis.arm.case import PoseCase, named_rows
 from camcomp.diagnosis.arm.linear import Shelf, linearise
 from camcomp.diagnosis.arm.next_poses import next_poses
-from camcomp.diagnosis.arm.noise_floor import StatedDeviation, TipFloor, far_off, least_floor, resolution, tip_floor
+from camcomp.diagnosis.arm.noise_floor import TipFloor, far_off, least_floor, resolution, tip_floor
 from camcomp.diagnosis.arm.pose_values import of_poses
 from camcomp.diagnosis.arm.poses import ArmBench, Poses, combined
 from camcomp.diagnosis.arm.temporary_offsets import EFFECT as SPELL
@@ -25,6 +25,7 @@ from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrink
 from camcomp.diagnosis.model.discrepancy import residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.explain import Explanation, KnownNoise, explain
+from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
 from camcomp.diagnosis.statistics.probability import EVEN
@@ -97,7 +98,7 @@ def cleaned(
     Weights of Huber, Ann. Math. Stat. 35 (1964) 73; the scale is that of the median.
     """
     bench = ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted)
-    shelf = Shelf.of([*bench.columns(without), *bench.shaped(without), *bench.waves(without)])
+    shelf = Shelf.of(bench.columns(without))
     left = residuals_of_richest(bench, shelf)
     outliers: list[tuple[str, int]] = []
     weights = []

@@ -329,6 +329,7 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     spreads = _spreads_of_shapes(data, terms, linear, amount, sd)
     scale = calibration_of("axes")
     causes, acting, train = [], [], [left[k] for k in data.train]
+    gains = _gains_of_functions(data, linear, left, sd)
     whole = sum(float(np.sum((data.values[k] - data.level) ** 2)) for k in data.train)
     for i in found.members:
         term, columns = terms[i], list(model.candidates[i].columns)
@@ -339,7 +340,9 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
         rest = sum(float(np.sum(left[k] ** 2)) for k in data.train)
         half = 1.96 * scale.interval * np.sqrt(np.diag(covariance)[columns]) + KNOWN * np.abs(amount[i])
         acting.append((term, amount[i]))
-        sure = _no_imitation(data, linear, i, effect=np.concatenate(own), left=np.concatenate(train), sd=sd)
+        sure = _no_imitation(
+            data, linear, i, effect=np.concatenate(own), left=np.concatenate(train), gains=gains[1], sd=sd
+        )
         causes.append(
             FoundCause(
                 effect=term.effect, target=term.target,
@@ -348,7 +351,6 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
                 parameters=_parameters(term, amount[i], half, spreads.get(i, {})),
             )
         )  # fmt: skip
-    gains = _gains_of_functions(data, linear, left, sd)
     drivers, hints = ({n: _share_of(linear, n, train, sd) for n, gain in each.items() if gain > 0.0} for each in gains)
     return ChannelFit(
         causes=tuple(causes), acting=tuple(acting), sizes=sizes, covariance=among, left=left, drivers=drivers,
@@ -356,21 +358,25 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     )  # fmt: skip
 
 
-def _no_imitation(data: ChannelData, linear: _Linear, i: int, effect: Floats, left: Floats, sd: float) -> float:
+def _no_imitation(
+    data: ChannelData, linear: _Linear, i: int, *, effect: Floats, left: Floats, gains: Mapping[str, float], sd: float
+) -> float:
     """Probability of a member with an effect (n,), given the excess of the residual (n,) over the floor, which it may imitate."""
     found = linear.found
     others = tuple(j for j in found.members if j != i)
     return probability_with_unmodelled(
-        effect, _design(linear, i), np.concatenate([_functions(data, k) for k in data.train]),
+        effect, _design(linear, i), {name: (gains.get(name, 0.0), own) for name, own in _functions(data).items()},
         excess=float(np.sqrt(max(float(np.mean(left**2)) - data.floor**2, 0.0))), floor=data.floor, noise=sd,
         odds=found.data.prior(found.members) - found.data.prior(others),
     )  # fmt: skip
 
 
-def _functions(data: ChannelData, k: int) -> Floats:
-    """Functions (n, q) of all covariates of a run."""
-    each = [smooth_functions(data.covariates[k][name], *ends) for name, ends in _ends(data).items()]
-    return np.hstack([np.zeros((len(data.values[k]), 0)), *each])
+def _functions(data: ChannelData) -> dict[str, Floats]:
+    """Functions (n, q) of every covariate in the rows of the fitted runs."""
+    return {
+        name: np.concatenate([smooth_functions(data.covariates[k][name], *ends) for k in data.train])
+        for name, ends in _ends(data).items()
+    }
 
 
 def _design(linear: _Linear, without: int | None = None) -> Floats:
@@ -392,7 +398,8 @@ def _gains_of_functions(
     noise is what these functions leave.
     """
     found, model = linear.found, linear.model
-    y, B = data.in_floors(dict(enumerate(left))), data.in_floors({k: _functions(data, k) for k in data.train})
+    y, light = (data.in_floors(dict(enumerate(each))) for each in (left, [np.ones(len(own)) for own in left]))
+    B = np.hstack([np.zeros((len(y), 0)), *_functions(data).values()]) * light[:, None]
     rest = noise_of(y - B @ np.linalg.lstsq(B, y, rcond=1e-9)[0], data.floor)
     out = []
     for factor in (1.0, min(rest / sd, 1.0)):

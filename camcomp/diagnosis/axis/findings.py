@@ -11,6 +11,7 @@ import numpy as np
 from camcomp.diagnosis.axis.gate import AxisGate
 from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, spikes
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
+from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.diagnosis.result.types import FoundCause, Law, LawPart
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Bools, Floats
@@ -145,23 +146,6 @@ class AxisRun:
         )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class AxisDeviation:
-    """Standard deviations of the instruments as the experiment states them; None where unstated."""
-
-    encoder_mm: float | None = None
-    force_N: float | None = None
-    encoder_rad: float | None = None
-    force_Nmm: float | None = None
-
-    def of(self, revolute: bool) -> AxisDeviation:
-        """Of one axis, in the study's mm and N."""
-        if not revolute:
-            return self
-        rad, torque = self.encoder_rad, self.force_Nmm
-        return AxisDeviation(None if rad is None else ARM_LENGTH * rad, None if torque is None else torque / ARM_LENGTH)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChannelRun:
     """One run of a channel, in the rows that count (n,). number: of the run in its experiment.
@@ -233,7 +217,7 @@ class AxisFindings:
     """Findings of one axis."""
 
     name: str
-    stated: AxisDeviation
+    stated: StatedDeviation
     revolute: bool = False
     wide: int = WIDE[0]
     causes: list[FoundCause] = field(default_factory=list)
@@ -253,6 +237,18 @@ class AxisFindings:
         return replace(
             self, causes=[*self.causes], unknown_in=[*self.unknown_in], details={**self.details},
         )  # fmt: skip
+
+    @property
+    def stated_mm(self) -> float | None:
+        """Stated deviation of the encoder, in the study's mm."""
+        rad = self.stated.encoder_rad
+        return (None if rad is None else ARM_LENGTH * rad) if self.revolute else self.stated.encoder_mm
+
+    @property
+    def stated_N(self) -> float | None:
+        """Stated deviation of the drive force, in the study's N."""
+        torque = self.stated.force_Nmm
+        return (None if torque is None else torque / ARM_LENGTH) if self.revolute else self.stated.force_N
 
     @property
     def channels(self) -> list[AxisChannel]:

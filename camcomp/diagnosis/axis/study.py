@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.axis import answer
-from camcomp.diagnosis.axis.findings import ROWS, AxisDeviation, AxisFindings, AxisRun
+from camcomp.diagnosis.axis.findings import ROWS, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.joint import JointRows, study_channel
 from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
@@ -25,7 +25,7 @@ from camcomp.diagnosis.axis.noise_floor import between_rows, following_floor, ro
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
-from camcomp.diagnosis.model.noise import REPEATABILITY_MM
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM, StatedDeviation
 from camcomp.diagnosis.model.verdict import VerdictInputs, Word, decide
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.standards import StandardValues
@@ -49,7 +49,7 @@ def studied(
     *,
     holdout: Sequence[str] = (),
     without: Sequence[str] = (),
-    stated: AxisDeviation | None = None,
+    stated: StatedDeviation | None = None,
     robot: Robot | None = None,
 ) -> tuple[DiagnosisResult, list[AxisFindings]]:
     """Result for logs of axes by name, and the findings of all axes.
@@ -64,7 +64,7 @@ def studied(
     outliers = {(r.name, int(row)) for runs in clean.values() for r, rows in runs for row in rows}
     cleaned = {name: [r.on_ticks().away_from_gaps() for r, _ in runs] for name, runs in clean.items()}
     around = AxisSurroundings(robot, cleaned)
-    ask = partial(_every_axis, around=around, without=set(without), stated=stated or AxisDeviation())
+    ask = partial(_every_axis, around=around, without=set(without), stated=stated or StatedDeviation())
     found = [a for a in ask(set(holdout), parts=1 + again) if a.channels]
     if not found:
         raise ValueError(
@@ -107,7 +107,7 @@ def _result(
 
 
 def _every_axis(
-    holdout: set[str], around: AxisSurroundings, without: set[str], stated: AxisDeviation, parts: int = 1
+    holdout: set[str], around: AxisSurroundings, without: set[str], stated: StatedDeviation, parts: int = 1
 ) -> list[AxisFindings]:
     """Findings of every axis without the runs held out. parts: how many such fits the progress counts."""
     steps = progress.steps(around.axes.items(), len(around.axes) * parts)
@@ -151,11 +151,10 @@ class AxisTask:
 
 
 def _axis(
-    name: str, runs: list[AxisRun], holdout: set[str], without: set[str], stated: AxisDeviation,
+    name: str, runs: list[AxisRun], holdout: set[str], without: set[str], stated: StatedDeviation,
     around: AxisSurroundings,
 ) -> AxisFindings:  # fmt: skip
     hinge = any(r.revolute for r in runs)
-    stated = stated.of(hinge)
     found = AxisFindings(name=name, stated=stated, revolute=hinge)
     usable = [r for r in runs if np.isfinite(r.encoder).sum() >= ROWS]
     if not usable:
@@ -202,7 +201,7 @@ def _followed(
     found = replace(found)
     late = lateness(every, gaps, train)
     runs, moves, values = motion_of(found, every, gaps, train, late)
-    stated = found.stated.encoder_mm
+    stated = found.stated_mm
     floor = stated or following_floor([(runs[k].setpoint, runs[k].encoder) for k in train])
     unseen = [
         between_rows(r.time, r.setpoint, late)[np.isin(r.time, m.time)] for r, m in zip(every, moves, strict=True)
@@ -228,7 +227,7 @@ def _forced(found: AxisFindings, task: AxisTask, late: float | None) -> AxisFind
     on = [run.moved() for run in runs]
     moves = [m.of(rows) for m, rows in zip(moves, on, strict=True)]
     values = [own[rows] for own, rows in zip(values, on, strict=True)]
-    stated = found.stated.force_N
+    stated = found.stated_N
     floor = stated or rows_floor([runs[k].force for k in task.train])
     whole = [(r.time, r.force) for r in task.usable]
     rows = task.rows(moves, values, channel="force", floor=floor, stated=stated is not None, whole=whole)
@@ -244,7 +243,7 @@ def _second_encoder(found: AxisFindings, task: AxisTask) -> AxisFindings:
     values = [np.asarray(r.load) - r.encoder for r in runs]
     moves = [travel(r.time, r.encoder, found.wide) for r in runs]
     own = max(rows_floor([r.encoder, np.asarray(r.load)]) for r in runs)
-    stated = found.stated.encoder_mm
+    stated = found.stated_mm
     floor = stated or float(np.hypot(np.sqrt(2.0) * own, REPEATABILITY_MM))
     rows = task.rows(
         moves, values, channel="behind", floor=floor, stated=stated is not None, runs=runs, train=train, test=test,

@@ -1,6 +1,6 @@
 """How probable is a cause where something unmodelled acts for certain, which may do what the cause seems to do?
 
-Functions f = B w of covariates, w ~ N(0, s^2), leave an excess residual of size U beside all that was fitted. A part of
+Functions f = B w of one covariate, w ~ N(0, s^2), leave an excess residual of size U beside all that was fitted. A part of
 size C of a cause's effect is nothing that the other columns explain. With e its direction, and B_o = (I - e e') B,
 
     without the cause:   C ~ U rho t_nu,      rho^2 = |B'e|^2 / tr L,      nu = (tr L)^2 / tr L^2,      L = B_o' B_o
@@ -14,6 +14,8 @@ Source: Brynjarsdottir, O'Hagan, Inverse Problems 30 (2014) 114007; Gelman et al
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from scipy.special import expit, logsumexp
 from scipy.stats import norm, t
@@ -25,7 +27,7 @@ from camcomp.ground.datatypes import Floats
 def probability_with_unmodelled(
     effect: Floats,
     others: Floats,
-    functions: Floats,
+    functions: Mapping[str, tuple[float, Floats]],
     *,
     excess: float,
     floor: float,
@@ -37,7 +39,7 @@ def probability_with_unmodelled(
     Args:
         effect: (n,) what the cause adds to a channel.
         others: (n, k) columns of all else that was fitted, per standard deviation of their amplitudes before the data.
-        functions: (n, q) of which the unmodelled effect may consist.
+        functions: covariate -> log evidence that the unmodelled effect is a function of it, and these functions (n, q).
         excess: rms of the residual beyond its noise.
         floor: noise of the channel, in which slabs are measured.
         noise: standard deviation of a row that counts as one of its own.
@@ -53,12 +55,17 @@ def probability_with_unmodelled(
     if not (excess > 0.0 and size > 0.0):
         return 1.0 if size > 0.0 else float(expit(odds))
     e, slabs = own / np.linalg.norm(own), np.array(WIDTHS) * floor * size / whole
-    B = across(functions)
-    along = e @ B
-    spread = np.linalg.svd(B - np.outer(e, along), compute_uv=False) ** 2
-    if not spread.sum() > 0.0:
+    without, with_cause, weight = [], [], []
+    for gain, B in functions.values():
+        B = across(B)
+        along = e @ B
+        spread = np.linalg.svd(B - np.outer(e, along), compute_uv=False) ** 2
+        if not spread.sum() > 0.0:
+            continue
+        scale = excess * max(float(np.sqrt(along @ along / spread.sum())), 1e-9)
+        without.append(float(t.logpdf(size / scale, spread.sum() ** 2 / (spread**2).sum()) - np.log(scale)))
+        with_cause.append(float(logsumexp(norm.logpdf(size, 0.0, np.hypot(slabs, scale))) - np.log(len(slabs))))
+        weight.append(gain)
+    if not weight:
         return float(expit(odds))
-    scale = excess * max(float(np.sqrt(along @ along / spread.sum())), 1e-9)
-    without = t.logpdf(size / scale, spread.sum() ** 2 / (spread**2).sum()) - np.log(scale)
-    with_cause = logsumexp(norm.logpdf(size, 0.0, np.hypot(slabs, scale))) - np.log(len(slabs))
-    return float(expit(odds + with_cause - without))
+    return float(expit(odds + logsumexp(np.add(with_cause, weight)) - logsumexp(np.add(without, weight))))

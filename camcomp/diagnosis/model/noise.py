@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
@@ -30,3 +32,14 @@ def resolution_of(values: Floats) -> float:
 def rounding_noise(step: float) -> float:
     """Standard deviation of rounding to a step: step / sqrt(12)."""
     return step / float(np.sqrt(12.0))
+
+
+@dataclass(frozen=True)
+class StatedDeviation:
+    """Standard deviations of the instruments as the experiment states them, in mm, N, rad and N mm; None where unstated."""
+
+    tip_mm: float | None = None
+    encoder_mm: float | None = None
+    force_N: float | None = None
+    encoder_rad: float | None = None
+    force_Nmm: float | None = None

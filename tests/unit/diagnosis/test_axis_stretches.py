@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.axis.disturbance_window import find_window
-from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
+from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.gate import intervals
+from camcomp.diagnosis.model.noise import StatedDeviation
 from tests.studies import axis_study as study
 
 FORCE, NOISE = 60.0, 0.5
@@ -74,7 +75,7 @@ def late(one_way_um):
         encoder=way - behind + 1e-4 * rng.standard_normal(len(time)),
         force=np.full(len(time), np.nan),
     )
-    return study({"x": [log]}, stated=AxisDeviation(encoder_mm=3e-4))
+    return study({"x": [log]}, stated=StatedDeviation(encoder_mm=3e-4))
 
 
 def test_a_lag_that_differs_between_the_ways_by_less_than_the_floor_is_a_lag():

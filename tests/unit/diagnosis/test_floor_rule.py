@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.axis.findings import AxisDeviation
+from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import DiagnosisResult
 from tests.contradictions import contradictions
@@ -76,7 +76,8 @@ def test_axes_that_are_quieter_than_stated_do_not_hide_another_one():
         return replace(log, setpoint=log.encoder + error, force=np.full(len(speed), np.nan))
 
     told = study(
-        {"x": [axis(0.1, 0.013)], "y": [axis(0.1, 0.0)], "z": [axis(0.1, 0.0)]}, stated=AxisDeviation(1e-3, 1.0)
+        {"x": [axis(0.1, 0.013)], "y": [axis(0.1, 0.0)], "z": [axis(0.1, 0.0)]},
+        stated=StatedDeviation(encoder_mm=1e-3, force_N=1.0),
     )
     assert told.gap.rms_um < 1e3 * np.sqrt(3.0) * 1e-3
     assert [(c.effect, c.target) for c in told.causes][:1] == [("servo_lag", "x")]

@@ -8,8 +8,8 @@ import pytest
 from ruamel.yaml import YAML
 
 from camcomp.diagnosis.arm.curves import covered, seen_angles
-from camcomp.diagnosis.arm.noise_floor import StatedDeviation
 from camcomp.diagnosis.arm.poses import Poses, approached
+from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.diagnosis.result.types import CurveCause
 from camcomp.model.config.load import load_config
 from camcomp.model.config.write_back import with_causes
@@ -17,7 +17,7 @@ from camcomp.model.statics.build import build_robot
 from tests.studies import arm_study
 from tests.validation.plants.arm_poses import measured
 
-STATED = StatedDeviation(tip=0.02)
+STATED = StatedDeviation(tip_mm=0.02)
 FLOOR_UM = 20.0 * np.sqrt(3.0)
 LIFT, COUNT = 1, 250
 A, B = ([-2, -2.5, -2, -3, -2, -3], [1, -0.3, 2, 3, 2, 3]), ([-1, -1.8, -1, -2, -1, -2], [2, -0.4, 1.5, 1, 2.5, 2])

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.axis.findings import AxisDeviation
 from camcomp.diagnosis.axis.next_moves import set_points
+from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.diagnosis.result.types import AxisMoves, StrokeBlock
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
@@ -52,7 +52,7 @@ def test_few_rows_ask_for_more_of_them(log):
     few = replace(
         log, **{name: getattr(log, name)[:60] for name in ("time", "setpoint", "encoder")}, force=np.full(60, np.nan)
     )
-    told = study({"x": [few]}, stated=AxisDeviation(encoder_mm=3e-4))
+    told = study({"x": [few]}, stated=StatedDeviation(encoder_mm=3e-4))
     assert told.verdict == "ambiguous"
     assert "leave no more than the noise" in told.next_experiment.outcomes[0] and told.next_experiment.moves.blocks
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from camcomp.diagnosis.arm.noise_floor import StatedDeviation
 from camcomp.diagnosis.arm.plausible import check_poses
 from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.arm.registration import register
-from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
+from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.noise_floor import rows_floor
 from camcomp.diagnosis.axis.plausible import check_axes
+from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
@@ -34,7 +34,7 @@ def robot():
 
 A, B = ([-2, -2.5, -2, -3, -2, -3], [1, -0.3, 2, 3, 2, 3]), ([-1, -1.8, -1, -2, -1, -2], [2, 0.1, 1.5, 1, 2.5, 2])
 TRUTH = {"longer": 0.7, "soft": 1.2e-8}
-STATED = StatedDeviation(tip=0.02)  # the noise put in
+STATED = StatedDeviation(tip_mm=0.02)  # the noise put in
 NOISE_UM = 20 * np.sqrt(3)
 
 
@@ -165,7 +165,7 @@ def test_beam_breaks_are_listed_and_not_fitted(robot, faulty):
 def test_heavy_tails_change_no_cause(robot, faulty):
     rng = np.random.default_rng(8)
     runs = [replace(r, tip=r.tip + 0.02 / np.sqrt(3) * rng.standard_t(3, r.tip.shape)) for r in faulty]
-    result = arm_study(robot, (), runs, holdout=["B"], stated=StatedDeviation(tip=0.0283))
+    result = arm_study(robot, (), runs, holdout=["B"], stated=StatedDeviation(tip_mm=0.0283))
     assert result.verdict in ("identified", "ambiguous")
     assert known(result) == FAULTS
 
@@ -283,9 +283,12 @@ def test_rows_of_an_axis_tell_its_floor_and_an_experiment_may_state_it():
     result = axis_study({"x": [axis_log()]})
     assert (result.verdict, result.floor.source) == ("identified", "rows")
     assert result.floor.um == pytest.approx(np.hypot(0.5, 1.0), rel=0.05)  # noise, and 1 um of repeatability
-    result = axis_study({"x": [axis_log()]}, stated=AxisDeviation(5e-4, 0.5))
+    result = axis_study({"x": [axis_log()]}, stated=StatedDeviation(encoder_mm=5e-4, force_N=0.5))
     assert (result.verdict, result.floor.source, result.floor.um) == ("identified", "stated", 0.5)
-    assert axis_study({"x": [axis_log(step=1e-3)]}, stated=AxisDeviation(5e-4, 0.2)).verdict == "unknown"
+    assert (
+        axis_study({"x": [axis_log(step=1e-3)]}, stated=StatedDeviation(encoder_mm=5e-4, force_N=0.2)).verdict
+        == "unknown"
+    )
 
 
 def test_the_resolution_of_an_encoder_is_noise():

@@ -21,7 +21,7 @@ def drawn(rng, present, lag):
     A = np.column_stack([u, one[:, 0]])
     fitted = A @ np.linalg.lstsq(A, gap, rcond=None)[0]
     effect = A[:, :1] @ np.linalg.lstsq(A, gap, rcond=None)[0][:1]
-    functions = smooth_functions(u, -1.0, 1.0)
+    functions = {"velocity": (0.0, smooth_functions(u, -1.0, 1.0))}
     excess = float(np.std(gap - fitted))
     return probability_with_unmodelled(effect, one, functions, excess=excess, floor=FLOOR, noise=FLOOR, odds=0.0)
 
@@ -45,5 +45,5 @@ def test_stated_probabilities_come_true():
 def test_without_anything_unmodelled_a_cause_is_sure_and_without_an_effect_the_prior_stays():
     one = np.ones((50, 1))
     given = {"excess": 0.0, "floor": 1.0, "noise": 1.0, "odds": 0.0}
-    assert probability_with_unmodelled(one[:, 0], 0.0 * one, one, **given) == 1.0
-    assert probability_with_unmodelled(0.0 * one[:, 0], one, one, **given) == 0.5
+    assert probability_with_unmodelled(one[:, 0], 0.0 * one, {}, **given) == 1.0
+    assert probability_with_unmodelled(0.0 * one[:, 0], one, {}, **given) == 0.5
