@@ -124,14 +124,12 @@ def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
 
 
 def _intervals(found: Sequence[AxisFindings]) -> tuple[IntervalShare, ...]:
-    every = [
-        IntervalShare(run=c.runs[i.run].name, t0_s=round(i.t0, 6), t1_s=round(i.t1, 6), share=round(i.share, 4))
-        for a in found
-        for c in a.channels
-        if c.gate is not None
-        for i in c.gate.intervals
+    every = [i for a in found for c in a.channels if c.gate is not None for i in c.gate.intervals]
+    tidy = [
+        i.model_copy(update={"t0_s": round(i.t0_s, 6), "t1_s": round(i.t1_s, 6), "share": round(i.share, 4)})
+        for i in every
     ]
-    return tuple(sorted(every, key=lambda each: -each.share))
+    return tuple(sorted(tidy, key=lambda each: -each.share))
 
 
 def shrinkage(judged: Sequence[Sequence[AxisFindings]], names: Sequence[str], tip: AxisSurroundings) -> UnseenShrinkage:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from camcomp.diagnosis.model.folds import Excess
+from camcomp.diagnosis.result.types import IntervalShare
 from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.ground.datatypes import Floats
@@ -26,27 +27,17 @@ KNOWN = 0.01  # of the constants of a loop, and of friction: no law of them is b
 
 
 @dataclass(frozen=True)
-class Interval:
-    """An interval of a run's time with a larger residual than elsewhere, and its share of the residual's energy."""
-
-    run: int
-    t0: float
-    t1: float
-    share: float
-
-
-@dataclass(frozen=True)
 class AxisGate:
     """`above` the floor, `at` it, or `open`; log10 of the chance that the floor alone looks like this; when."""
 
     word: Literal["above", "at", "open"]
     chance: float
-    intervals: tuple[Interval, ...]
+    intervals: tuple[IntervalShare, ...]
 
 
-def judge(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> AxisGate:
-    """Judge residuals (n,) mm or N per run at times (n,) s against a floor."""
-    found, chance = intervals(left, times, floor)
+def judge(left: Sequence[Floats], times: Sequence[Floats], floor: float, names: Sequence[str]) -> AxisGate:
+    """Judge residuals (n,) mm or N at times (n,) s of runs with names against a floor."""
+    found, chance = intervals(left, times, floor, names)
     floor = max(floor, 1e-12)
     parts = max(STRETCHES // len(left), 2)
     size = np.array([energy(part, floor) for run in left for part in np.array_split(run, parts)]) / floor**2
@@ -74,7 +65,9 @@ def energy(left: Floats, floor: float) -> float:
     return max(float(np.mean(slow**2)) - beyond, 0.0) + noise
 
 
-def intervals(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> tuple[tuple[Interval, ...], float]:
+def intervals(
+    left: Sequence[Floats], times: Sequence[Floats], floor: float, names: Sequence[str]
+) -> tuple[tuple[IntervalShare, ...], float]:
     """Stretches in which the mean square is above the floor, and out of what other stretches show (1 % over all of them).
 
     With log10 of the chance of the most conspicuous stretch.
@@ -98,18 +91,14 @@ def intervals(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> 
     chances = norm.logsf((log - middle) / max(spread, 1e-12)) / np.log(10.0) + np.log10(len(stretches))
     out = (chances < np.log10(FALSE)) & (size > LOCAL * floor**2) & (size > pure * np.exp(middle))
     out &= np.array([_going_on(left[k][rows]) for k, rows in stretches]) > GOING_ON * floor**2
-    joined: list[Interval] = []
+    joined: list[IntervalShare] = []
     for i in np.flatnonzero(out).tolist():
         k, rows = stretches[i]
-        t0, t1, share = (
-            float(times[k][rows[0]]),
-            float(times[k][rows[-1]]),
-            float(size[i] * len(rows)) / max(whole, 1e-300),
-        )
-        if i and out[i - 1] and joined[-1].run == k:  # the stretch before it
-            joined[-1] = Interval(k, joined[-1].t0, t1, joined[-1].share + share)
-        else:
-            joined.append(Interval(k, t0, t1, share))
+        begin, share = times[k][rows[0]], float(size[i] * len(rows)) / max(whole, 1e-300)
+        if i and out[i - 1] and stretches[i - 1][0] == k:  # the stretch before it
+            before = joined.pop()
+            begin, share = before.t0_s, before.share + share
+        joined.append(IntervalShare(run=names[k], t0_s=float(begin), t1_s=float(times[k][rows[-1]]), share=share))
     return tuple(joined), float(chances[out].min(initial=0.0))
 
 

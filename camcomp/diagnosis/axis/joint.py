@@ -374,5 +374,5 @@ def _channel(rows: JointRows, done: ChannelFit, response: Response) -> AxisChann
         left = [each / np.hypot(1.0, by / rows.floor) for each, by in zip(left, known, strict=True)]
     if rows.noise:
         left = [each / rows.noise[k] for k, each in zip(order, left, strict=True)]
-    channel.gate = judge(left, [moves[k].time for k in order], rows.floor)
+    channel.gate = judge(left, [moves[k].time for k in order], rows.floor, [rows.runs[k].name for k in order])
     return channel

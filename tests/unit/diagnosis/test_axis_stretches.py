@@ -51,14 +51,14 @@ def stretch(leftover):
     """Findings in half a second of given data within twenty of noise of size 1."""
     left = np.random.default_rng(3).standard_normal(4001)
     left[1001:1101] = leftover
-    return intervals([left], [5e-3 * np.arange(4001)], 1.0)[0]
+    return intervals([left], [5e-3 * np.arange(4001)], 1.0, ["r"])[0]
 
 
 def test_a_stretch_is_more_than_noise_that_is_larger_there():
     rng = np.random.default_rng(4)
     assert stretch(2.2 * rng.standard_normal(100)) == ()
     (found,) = stretch(2.0 + rng.standard_normal(100))
-    assert (found.t0, found.t1) == pytest.approx((5.0, 5.5), abs=0.01)
+    assert (found.t0_s, found.t1_s) == pytest.approx((5.0, 5.5), abs=0.01)
 
 
 def late(one_way_um):
