@@ -232,12 +232,6 @@ class AxisFindings:
     law: Law | None = None
     laws: list[LawPart] = field(default_factory=list)  # of its following error, as the machine file has them
 
-    def copied(self) -> AxisFindings:
-        """The findings with lists of their own."""
-        return replace(
-            self, causes=[*self.causes], unknown_in=[*self.unknown_in], details={**self.details},
-        )  # fmt: skip
-
     @property
     def stated_mm(self) -> float | None:
         """Stated deviation of the encoder, in the study's mm."""

@@ -61,11 +61,8 @@ class JointRows:
     noise: Sequence[Floats] = ()
 
 
-def study_channel(
-    found: AxisFindings, rows: JointRows, around: AxisSurroundings, without: set[str]
-) -> tuple[AxisFindings, AxisChannel]:
-    """Findings on an axis with one more channel and its causes."""
-    found = found.copied()
+def study_channel(found: AxisFindings, rows: JointRows, around: AxisSurroundings, without: set[str]) -> AxisChannel:
+    """One more channel of an axis; its causes and what else it shows go into the findings."""
     seen = [np.isin(run.time, m.time) for run, m in zip(rows.runs, rows.moves, strict=True)]
     axes = [around.driven(found.name, run) for run in rows.runs]
     if rows.channel == "force":
@@ -113,7 +110,7 @@ def study_channel(
     ):  # there is no gap that causes would explain
         channel.gate, channel.runs = AxisGate("at", 0.0, ()), [replace(r, left=r.gap) for r in channel.runs]
         found.laws = [] if following else found.laws
-        return found, channel
+        return channel
     if rows.channel == "force" and not rows.runs[0].revolute:
         _find_ripple(found, channel)
     if channel.gate is not None and channel.gate.word == "open" and done.drivers:
@@ -123,7 +120,7 @@ def study_channel(
         if channel.gate.word == "above":
             found.unknown_in += sorted((done.drivers or done.hints).items(), key=lambda each: -each[1])
     found.causes += done.causes
-    return found, channel
+    return channel
 
 
 def _find_ripple(found: AxisFindings, channel: AxisChannel) -> None:

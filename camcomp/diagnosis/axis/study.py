@@ -161,11 +161,10 @@ def _axis(
         return found
     train = [k for k, r in enumerate(usable) if r.name not in holdout]
     test = [k for k, r in enumerate(usable) if r.name in holdout]
-    found.wide = encoder_width(usable, train)
     task = AxisTask(usable=usable, train=train, test=test, without=without, around=around)
-    found = _motor(found, task)
+    found = _motor(replace(found, wide=encoder_width(usable, train)), task)
     if any(usable[k].load is not None for k in train):
-        found = _second_encoder(found, task)
+        _study_second_encoder(found, task)
     _name_rest(found)
     if found.strange:
         asked = [(usable[r.number], r.move) for r in found.following.fitted] if found.following else []
@@ -174,31 +173,31 @@ def _axis(
     return found
 
 
-def _motor(found: AxisFindings, task: AxisTask) -> AxisFindings:
-    """Following error and drive force.
+def _motor(blank: AxisFindings, task: AxisTask) -> AxisFindings:
+    """Findings on following error and drive force.
 
     The drive force shows rows of which the following error does not show the loop, those of a disturbance force, and
     friction that differs between the directions. Both are fitted again with them.
     """
-    first, pushed, asymmetric = found, list[tuple[str, float, float]](), False
+    pushed, asymmetric = list[tuple[str, float, float]](), False
     for again in (False, True):
-        found, late = _followed(first, task, pushed, asymmetric)
-        found = _forced(found, task, late)
+        found = replace(blank, causes=[], unknown_in=[], details={})
+        late = _study_following(found, task, pushed, asymmetric)
+        _study_force(found, task, late)
         pushed, asymmetric = found.pushed, any(ASYMMETRY.intersection(c.parameters) for c in found.causes)
         if again or found.following is None or not (pushed or asymmetric):
             break
     return found
 
 
-def _followed(
+def _study_following(
     found: AxisFindings, task: AxisTask, pushed: Sequence[tuple[str, float, float]], asymmetric: bool
-) -> tuple[AxisFindings, float | None]:
-    """The following error, and how late the axis is on average, s."""
+) -> float | None:
+    """The following error; how late the axis is on average, s, None where that does not show."""
     every, train = [r.unpushed(pushed) for r in task.usable], task.train
     gaps = [r.gap for r in every]
     if not train or not all(np.isfinite(gaps[k]).all() for k in train):
-        return found, None
-    found = replace(found)
+        return None
     late = lateness(every, gaps, train)
     runs, moves, values = motion_of(found, every, gaps, train, late)
     stated = found.stated_mm
@@ -210,15 +209,15 @@ def _followed(
         moves, values, channel="following", floor=floor, stated=stated is not None, asymmetric=asymmetric, runs=every,
         whole=[(r.time, r.gap) for r in task.usable], noise=[np.hypot(1.0, own / floor) for own in unseen],
     )  # fmt: skip
-    found, found.following = study_channel(found, rows, task.around, task.without)
-    return found, late
+    found.following = study_channel(found, rows, task.around, task.without)
+    return late
 
 
-def _forced(found: AxisFindings, task: AxisTask, late: float | None) -> AxisFindings:
+def _study_force(found: AxisFindings, task: AxisTask, late: float | None) -> None:
     """The drive force."""
     if not task.train or not all(np.isfinite(task.usable[k].force).all() for k in task.train):
-        return found
-    found, forces = replace(found), [r.force for r in task.usable]
+        return
+    forces = [r.force for r in task.usable]
     swings = any(
         c.effect == "servo_overshoot" for c in found.causes
     )  # set-points a while later are no motion of such a loop
@@ -231,11 +230,10 @@ def _forced(found: AxisFindings, task: AxisTask, late: float | None) -> AxisFind
     floor = stated or rows_floor([runs[k].force for k in task.train])
     whole = [(r.time, r.force) for r in task.usable]
     rows = task.rows(moves, values, channel="force", floor=floor, stated=stated is not None, whole=whole)
-    found, found.force = study_channel(found, rows, task.around, task.without)
-    return found
+    found.force = study_channel(found, rows, task.around, task.without)
 
 
-def _second_encoder(found: AxisFindings, task: AxisTask) -> AxisFindings:
+def _study_second_encoder(found: AxisFindings, task: AxisTask) -> None:
     """Second encoder behind the gear against the encoder of the motor."""
     every = [k for k, r in enumerate(task.usable) if r.load is not None]
     runs = [task.usable[k] for k in every]
@@ -249,8 +247,7 @@ def _second_encoder(found: AxisFindings, task: AxisTask) -> AxisFindings:
         moves, values, channel="behind", floor=floor, stated=stated is not None, runs=runs, train=train, test=test,
         numbers=every,
     )  # fmt: skip
-    found, found.behind = study_channel(found, rows, task.around, task.without)
-    return found
+    found.behind = study_channel(found, rows, task.around, task.without)
 
 
 def _name_rest(found: AxisFindings) -> None:
