@@ -43,6 +43,7 @@ class ChannelFit:
 
     acting: the causes with their amplitudes. columns (n, k): of these and the healthy sizes, of the fitted runs. drivers: covariate of the dictionary that is more likely than not ->
     share of the residual's energy. hints: the same, where nothing but such functions makes rows of the residual alike.
+    imitated: probability of every cause where the residual shows something unmodelled.
     """
 
     causes: tuple[FoundCause, ...]
@@ -53,6 +54,7 @@ class ChannelFit:
     columns: Floats
     drivers: Mapping[str, float]
     hints: Mapping[str, float]
+    imitated: tuple[float, ...]
 
     def combined(self, weights: Mapping[str, Sequence[float]]) -> Estimate:
         """A sum of healthy sizes, by kind, with its 95 % interval."""
@@ -328,7 +330,7 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     left, amount, sizes = _left(data, terms, linear)
     spreads = _spreads_of_shapes(data, terms, linear, amount, sd)
     scale = calibration_of("axes")
-    causes, acting, train = [], [], [left[k] for k in data.train]
+    causes, acting, imitated, train = [], [], [], [left[k] for k in data.train]
     gains = _gains_of_functions(data, linear, left, sd)
     whole = sum(float(np.sum((data.values[k] - data.level) ** 2)) for k in data.train)
     for i in found.members:
@@ -340,13 +342,15 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
         rest = sum(float(np.sum(left[k] ** 2)) for k in data.train)
         half = 1.96 * scale.interval * np.sqrt(np.diag(covariance)[columns]) + KNOWN * np.abs(amount[i])
         acting.append((term, amount[i]))
-        sure = _no_imitation(
-            data, linear, i, effect=np.concatenate(own), left=np.concatenate(train), gains=gains[1], sd=sd
+        imitated.append(
+            _no_imitation(
+                data, linear, i, effect=np.concatenate(own), left=np.concatenate(train), gains=gains[1], sd=sd
+            )
         )
         causes.append(
             FoundCause(
                 effect=term.effect, target=term.target,
-                probability=scale.calibrate(min(found.places[term.place], sure)),
+                probability=scale.calibrate(found.places[term.place]),
                 share=round(min(max((less - rest) / max(whole, 1e-300), 0.0), 1.0), 4),
                 parameters=_parameters(term, amount[i], half, spreads.get(i, {})),
             )
@@ -354,14 +358,16 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     drivers, hints = ({n: _share_of(linear, n, train, sd) for n, gain in each.items() if gain > 0.0} for each in gains)
     return ChannelFit(
         causes=tuple(causes), acting=tuple(acting), sizes=sizes, covariance=among, left=left, drivers=drivers,
-        hints=hints, columns=_design(linear),
+        hints=hints, columns=_design(linear), imitated=tuple(imitated),
     )  # fmt: skip
 
 
 def _no_imitation(
     data: ChannelData, linear: _Linear, i: int, *, effect: Floats, left: Floats, gains: Mapping[str, float], sd: float
 ) -> float:
-    """Probability of a member with an effect (n,), given the excess of the residual (n,) over the floor, which it may imitate."""
+    """Probability of a member with an effect (n,), where the excess of the residual (n,) over the floor is unmodelled for
+    certain.
+    """
     found = linear.found
     others = tuple(j for j in found.members if j != i)
     return probability_with_unmodelled(

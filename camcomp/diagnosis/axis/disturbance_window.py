@@ -48,7 +48,8 @@ def find_window(
         return None
     near = np.arange(-FARTHEST * cells[k], FARTHEST * cells[k] + 1)
     edges = np.unique(np.clip([end + near for end in coarse[k][1:]], 0, len(rests[k])))
-    return Window(k, *best(k, edges, rows[k])[1:])
+    _, first, last = best(k, edges, rows[k])
+    return Window(k, first, last) if times[k][last - 1] - times[k][first] >= SHORTEST_S else None
 
 
 def _projected(

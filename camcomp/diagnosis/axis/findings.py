@@ -221,6 +221,7 @@ class AxisFindings:
     revolute: bool = False
     wide: int = WIDE[0]
     causes: list[FoundCause] = field(default_factory=list)
+    imitated: dict[str, float] = field(default_factory=dict)  # effect -> probability beside something unmodelled
     following: AxisChannel | None = None
     force: AxisChannel | None = None
     behind: AxisChannel | None = None

@@ -120,6 +120,7 @@ def study_channel(found: AxisFindings, rows: JointRows, around: AxisSurroundings
         if channel.gate.word == "above":
             found.unknown_in += sorted((done.drivers or done.hints).items(), key=lambda each: -each[1])
     found.causes += done.causes
+    found.imitated |= {c.effect: p for c, p in zip(done.causes, done.imitated, strict=False)}
     return channel
 
 

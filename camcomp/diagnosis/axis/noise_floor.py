@@ -8,9 +8,10 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import median_abs_deviation, norm
 
-from camcomp.diagnosis.model.noise import REPEATABILITY_MM, resolution_of, rounding_noise
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.ground.datatypes import Floats
 
+STAYING = 0.1  # of the rows that do not move, from which on steps are a resolution
 SPIKE = 12.0  # deviations from the neighbours' median
 FAST_S = 0.005  # between rows: within two of them no drive goes out and comes back, however little
 LEAST_SPIKE_MM = 0.1  # the same between rows that are further apart: none goes so far
@@ -26,8 +27,11 @@ def rows_floor(channels: Sequence[Floats]) -> float:
     """
     noise = []
     for y in channels:
+        steps = np.abs(np.diff(y))
+        quantum = float(np.min(steps[steps > 1e-9 * max(float(np.ptp(y)), 1e-300)], initial=np.inf))
+        often = np.mean(steps < 0.5 * quantum) > STAYING  # rows that stay on a value: it is a resolution
         scatter = float(median_abs_deviation(np.diff(y, 4), scale="normal")) / np.sqrt(70.0) if len(y) > 5 else 0.0
-        noise.append(max(scatter, rounding_noise(resolution_of(y))))
+        noise.append(max(scatter, quantum / np.sqrt(12.0) if often and np.isfinite(quantum) else 0.0))
     return float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0
 
 

@@ -117,7 +117,8 @@ def _every_axis(
     ]
     for a in found:
         if a.strange:
-            a.causes = [c.model_copy(update={"probability": with_discrepancy(c.probability)}) for c in a.causes]
+            p = [with_discrepancy(min(c.probability, a.imitated.get(c.effect, 1.0))) for c in a.causes]
+            a.causes = [c.model_copy(update={"probability": own}) for c, own in zip(a.causes, p, strict=True)]
     return found
 
 
@@ -181,7 +182,7 @@ def _motor(blank: AxisFindings, task: AxisTask) -> AxisFindings:
     """
     pushed, asymmetric = list[tuple[str, float, float]](), False
     for again in (False, True):
-        found = replace(blank, causes=[], unknown_in=[], details={})
+        found = replace(blank, causes=[], imitated={}, unknown_in=[], details={})
         late = _study_following(found, task, pushed, asymmetric)
         _study_force(found, task, late)
         pushed, asymmetric = found.pushed, any(ASYMMETRY.intersection(c.parameters) for c in found.causes)
