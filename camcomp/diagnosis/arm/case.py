@@ -26,7 +26,7 @@ POSES_MAP, UNKNOWN_MAP = "poses", "poses beside unknown"  # kinds of log of the 
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class PlacedEffect:
     """An effect at a target: its columns and the probability of the posterior."""
 
     effect: str
@@ -94,7 +94,7 @@ class PoseCase:
         return [self.bench.gap(k, self.causes) for k in self.bench.own]
 
     @cached_property
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[PlacedEffect]:
         """Members of the most probable set, and the targets of its families."""
         return parts_of(self)
 
@@ -107,10 +107,10 @@ class PoseCase:
         return [self.shelf.candidates[i].place for i in members]
 
 
-def parts_of(case: PoseCase) -> list[Part]:
+def parts_of(case: PoseCase) -> list[PlacedEffect]:
     """Members of the most probable set, and the targets of its families."""
     found, columns = case.explanation, case.shelf.columns
-    own = [Part(c.effect, c.target, list(c.columns), found.places[c.place])
+    own = [PlacedEffect(c.effect, c.target, list(c.columns), found.places[c.place])
            for c in (found.model.candidates[i] for i in found.members)]  # fmt: skip
     for name, _ in found.background.families:
         on = [j for j in found.model.family(name)[0].tolist() if case.amount[j] != 0.0]
@@ -119,7 +119,7 @@ def parts_of(case: PoseCase) -> list[Part]:
             alone = next((p for p in own if (p.effect, p.target) == (name, target)), None)
             if alone is None:
                 chance = float(expit(found.odds_of(here)))
-                own.append(Part(name, target, here, found.families[name] * chance))
+                own.append(PlacedEffect(name, target, here, found.families[name] * chance))
             else:
                 alone.columns.extend(j for j in here if j not in alone.columns)
     return own

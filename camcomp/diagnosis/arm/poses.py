@@ -30,7 +30,7 @@ _SHARE_OF_SCALE = 0.05  # step of a difference
 _SAME_STEP = 1e-6  # times in equal steps of 1 are row numbers
 _JOINT_STEP = 1e-5  # rad or mm
 CURVE = "joint_curve"
-Shape = tuple[
+EffectShape = tuple[
     tuple[str, float, float, float], ...
 ]  # what shapes an effect: name, value, and between which values it lies
 _WRIST = {"joint_coupling": 2}  # effects of the last joints only: of how many
@@ -124,7 +124,7 @@ class Column:
     target: str | None
     module: Any
     parameter: Parameter
-    shape: Shape = ()
+    shape: EffectShape = ()
 
     def cause(self, amount: float) -> Cause:
         """The cause with this parameter at an amplitude."""
@@ -215,7 +215,7 @@ class ArmBench:
         for name, module in shelf.usable("effects", (*_UNSEEN, *without)):
             for target in self._targets(name, module):
                 own = _for(module, self.drive(target or self.actuators[0]).revolute)
-                shapes: list[Shape] = [()]
+                shapes: list[EffectShape] = [()]
                 if scanned := any(p.scan for p in own):
                     shapes = _shapes(own, self._warm) if timed and _is_of_arm(module) else []
                 found += [Column(name, target, module, p, s) for s in shapes for p in own if not (scanned and p.shape)]
@@ -403,7 +403,7 @@ def _for(module: Any, turns: bool) -> tuple[Parameter, ...]:
     return tuple(own)
 
 
-def _shapes(parameters: Sequence[Parameter], warm: bool) -> list[Shape]:
+def _shapes(parameters: Sequence[Parameter], warm: bool) -> list[EffectShape]:
     """Shapes to try of an effect: times of warming up, or nothing where temperatures are logged; no shape of what is placed."""
     scanned = [p for p in parameters if p.scan]
     if len(scanned) != 1 or scanned[0].placed or scanned[0].turns:
