@@ -17,7 +17,7 @@ PLAIN = "lag of the position loop"
 REMEDY = "raise the gain of the position loop (kv) or switch feed-forward on, the same on all axes; or cut more slowly"
 SOURCE = "first-order position loop, tau = 1/kv (Gross, Hamann, Wiegaertner: Electrical feed drives in automation)"
 _KV = "loop gains kv of 100 to 2000 1/s"
-FITTED = (Parameter("time_constant_ms", "ms", 0.0, 0.0, 100.0, 3.0, 0.005, _KV, sign=1),)
+FITTED = (Parameter("time_constant_ms", "ms", 0.0, 0.0, 500.0, 3.0, 0.005, _KV, sign=1),)
 PARAMETERS = (
     Parameter("time_constant_ms", "ms", 0.0, -500.0, 500.0, 3.0, 0.005, f"{_KV}; joints of arms up to 200 ms"),
 )

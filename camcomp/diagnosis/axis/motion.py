@@ -6,15 +6,15 @@ import numpy as np
 
 from camcomp.diagnosis.axis.findings import ROWS, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.terms import (
-    SETTLED,
     WIDE,
     AxisTravel,
     solve,
     travel,
 )
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.ground.datatypes import Bools, Floats
 
-LATEST_S = 0.1  # of a loop
+LATEST_S = 0.5  # of a loop
 ENCODER_BETTER = 0.8  # of what set-points leave of a channel: what encoders have to leave to be the motion
 SETPOINT_WIDE = (2, *WIDE)  # samples on either side of a local cubic through set-points
 SAME_MISFIT = (
@@ -80,8 +80,13 @@ def motion_of(
     by_encoder = misfit(encoders) < ENCODER_BETTER * misfit(setpoints)
     if followed is not None and not by_encoder:
         setpoints = narrowest(followed, 0.0)
-    settled = [r.time >= r.time[0] + SETTLED * late for r in runs]
-    return kept(encoders if by_encoder else setpoints, settled)
+    begun = [r.time >= r.time[0] + late * _fades(r.gap) for r in runs]
+    return kept(encoders if by_encoder else setpoints, begun)
+
+
+def _fades(gap: Floats) -> float:
+    """Time constants after which a late axis shows no more how it moved before its log began."""
+    return max(float(np.log(max(np.abs(gap).max(), 1e-300) / REPEATABILITY_MM)), 0.0)
 
 
 def _usual(m: AxisTravel) -> Floats:

@@ -13,7 +13,6 @@ from camcomp.model.hysteresis import direction, first_order
 from camcomp.model.seams import Seams
 
 STANDS_OUT = 1.6  # times the next line of a spectrum
-SETTLED = 5.0  # time constants after which a late axis shows no more how it moved before
 WIDE = (5, 10, 20, 40)  # samples on either side of a local cubic
 
 

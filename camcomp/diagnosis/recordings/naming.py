@@ -18,8 +18,10 @@ _USUAL = {  # in addition to the log's own names, most specific first; those of 
     TEMPERATURE: ("measurement_temperature", "temperature"),
 }
 _ACTUATOR = {  # names of an actuator's channels, {a}: its name; those of a drive count only with a unit of force or torque
-    "setpoint": ("{a}_cmd", "{a}_command", "{a}_commanded", "{a}_setpoint", "{a}_target", "{a}_desired", "command_{a}", "target_{a}"),
-    "encoder": ("{a}", "{a}_joint", "{a}_act", "{a}_actual", "{a}_measured", "{a}_position", "actual_{a}"),
+    "setpoint": ("{a}_cmd", "{a}_command", "{a}_commanded", "{a}_setpoint", "{a}_target", "{a}_desired", "command_{a}", "target_{a}",
+                 *(f"{{a}}{n}_{word}" for n in ("", "1") for word in ("command_position", "set_position", "cmd_pos", "set_pos"))),
+    "encoder": ("{a}", "{a}_joint", "{a}_act", "{a}_actual", "{a}_measured", "{a}_position", "actual_{a}",
+                *(f"{{a}}{n}_{word}" for n in ("", "1") for word in ("actual_position", "act_pos"))),
     "drive": ("{a}_torque", "{a}_force", "torque_{a}", "force_{a}", "act_{a}", "{a}_act", "{a}_actual"),
     "load": ("se_{a}", "{a}_load", "{a}_second"),
 }  # fmt: skip
@@ -196,8 +198,9 @@ def _unit(part: SampledColumns, column: int, log: str) -> str:
 
 
 def _plain(name: str) -> str:
-    """A name in lower case, its words joined by underscores, steps of a path by points."""
-    return re.sub(r"(?<=\w)[\s-]+(?=\w)", "_", name.lower().lstrip("/").replace("/", "."))
+    """A name in lower case, its words (ActualPosition: two) joined by underscores, steps of a path by points."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", "_", name)
+    return re.sub(r"(?<=\w)[\s-]+(?=\w)", "_", apart.lower().lstrip("/").replace("/", "."))
 
 
 def _same(name: str, wanted: str) -> bool:

@@ -161,7 +161,8 @@ def _times(joined: Joined, driven: bool, period_s: float | None, notes: list[str
     row, n = joined.row, len(joined.row)
     if joined.time is None:
         if period_s is None:
-            notes.append("no usable times, t_s is the number of the row")
+            so = ": speeds and lags are per row, unless --period-s says how far rows are apart" if driven else ""
+            notes.append(f"no usable times, t_s is the number of the row{so}")
         else:
             notes.append(f"no usable times, rows are {period_s:g} s apart (--period-s)")
         return (row - row[0]) * (1.0 if period_s is None else period_s), np.arange(n)

@@ -383,6 +383,26 @@ def test_names_and_units_that_joints_have_elsewhere(read):
     assert "second encoders that never move dropped: load_A2_rad" in got.told
 
 
+def test_names_that_controls_of_machine_tools_give_to_axes(read):
+    """Words written as one, a number behind the letter of an axis; speeds and currents are none of a log's columns."""
+    heads = [
+        f"{a}1_{word}"
+        for a in "XYZ"
+        for word in ("ActualPosition", "ActualVelocity", "CommandPosition", "CurrentFeedback")
+    ]
+    rows = [",".join(str(10 * k + i) for i in range(len(heads))) for k in range(4)]
+    got = read("\n".join([",".join(heads), *rows]), "--period-s", "0.1", config="cartesian")
+    first = {name: values[1] for name, values in got.logs["poses"].items()}
+    places = {"act_x_mm": 10, "cmd_x_mm": 12, "act_y_mm": 14, "cmd_y_mm": 16, "act_z_mm": 18, "cmd_z_mm": 20}
+    assert first == pytest.approx({"t_s": 0.1, **places})
+    assert "6 columns dropped" in got.told
+
+
+def test_a_run_that_was_driven_without_times_asks_for_the_step_between_its_rows(read):
+    got = read("x_cmd,y_cmd,z_cmd,act_x,act_y,act_z\n0,0,0,0,0,0\n1,1,0,0,1,0\n2,2,0,0,2,0\n", config="cartesian")
+    assert got.code == 0 and "speeds and lags are per row, unless --period-s says" in got.told
+
+
 @pytest.mark.parametrize(
     ("text", "due"),
     [

@@ -1,4 +1,4 @@
-"""Rows that are further apart than moves take to accelerate: what happened between them is nobody's cause."""
+"""Loops that are late against the rows of a log: rows further apart than moves accelerate, logs that begin amid a move."""
 
 import numpy as np
 import pytest
@@ -63,3 +63,17 @@ def test_a_lag_is_named_alone_with_its_time_constant():
     found = cause.parameters["time_constant_ms"]
     assert found.value == pytest.approx(1e3 * late, rel=0.02) and found.ci95[0] < 1e3 * late < found.ci95[1]
     assert result.shrinkage.holdout == ("r0", "r1", "r2") and result.shrinkage.ratio > 0.85
+
+
+def test_a_log_that_begins_amid_a_move_of_a_slow_loop_is_explained_by_its_lag():
+    """What the loop remembers of the time before the log is no cause; 0.3 s are behind joints of arms, not only 0.1 s."""
+    late, before = 0.3, 5.0
+    time = np.arange(0.0, 40.0, FINE_S)
+    setpoint = 60.0 * np.sin(0.9 * time) + 25.0 * np.sin(2.3 * time + 0.4)
+    on = np.arange(round(before / FINE_S), len(time), 10)
+    moved = followed(setpoint, late)[on] + 1e-3 * np.random.default_rng(4).standard_normal(len(on))
+    run = AxisRun(name="r", time=time[on], setpoint=setpoint[on], encoder=moved, force=np.full(len(on), np.nan))
+    result = axis_study({"x": [run]})
+    (cause,) = result.causes
+    assert (result.verdict, cause.effect) == ("identified", "servo_lag")
+    assert cause.parameters["time_constant_ms"].value == pytest.approx(1e3 * late, rel=1e-3)
