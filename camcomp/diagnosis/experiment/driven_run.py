@@ -262,10 +262,15 @@ def _behind(log: Logged, tip: Floats, turned: Floats | None, program: _Program) 
     return found if float(np.median(found.distance)) < ASIDE_MM else None
 
 
+def _path_length(path: Path, at: Aligned) -> Floats:
+    """Path length (n,) mm from the start of the program to positions on it."""
+    length = path_geometry.lengths(path)
+    return np.asarray(np.concatenate([[0.0], np.cumsum(length)])[at.motion] + at.share * length[at.motion])
+
+
 def _agreement(path: Path, found: Aligned, tip: Floats) -> float:
     """Share of the moving rows in the direction of the program, 1 if no row moves."""
-    length = path_geometry.lengths(path)
-    at = np.concatenate([[0.0], np.cumsum(length)])[found.motion] + found.share * length[found.motion]
+    at = _path_length(path, found)
     step = np.linalg.norm(np.diff(tip, axis=0), axis=1)
     moving = step > STILL_MM
     return float(np.mean(np.diff(at)[moving] > -0.5 * step[moving])) if moving.any() else 1.0
@@ -371,7 +376,7 @@ def _at_corners(path: Path, aligned: Aligned, time: Floats, acceleration: float)
     begins = path_geometry.tangents(path, moves[1:], np.zeros(len(moves) - 1))
     turns = np.sum(ends * begins, axis=1) < np.cos(JOIN_ANGLE)
     corner = np.cumsum(length)[moves[:-1]][turns]
-    at = np.concatenate([[0.0], np.cumsum(length)])[aligned.motion] + aligned.share * length[aligned.motion]
+    at = _path_length(path, aligned)
     if not len(corner) or len(at) < 2:
         return np.zeros(len(at), bool)
     step = np.abs(np.diff(at))

@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path as FilePath
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from camcomp.diagnosis.experiment.driven_run import drive
 from camcomp.diagnosis.experiment.log_checks import (
@@ -122,13 +123,7 @@ def steadied(time: Floats, values: Floats) -> Floats | None:
     n = len(time)
     step = float(np.median(np.diff(time))) if n > 1 else 0.0
     reach = int(min(STEADY_S / step if step > 0 else 0.0, n / 8))
-    if reach < 2:
-        return every
-    near = np.arange(-reach, reach + 1)
-    weight = 1.0 - (near / (reach + 1.0)) ** 2
-    sums = [np.convolve(np.ones(n), (weight * near**k)[::-1], "same") for k in range(3)]
-    first, second = (np.convolve(every, (weight * near**k)[::-1], "same") for k in range(2))
-    return np.asarray((sums[2] * first - sums[1] * second) / (sums[2] * sums[0] - sums[1] ** 2), float)
+    return every if reach < 2 else np.asarray(savgol_filter(every, 2 * reach + 1, 1), float)
 
 
 def unread(table: CsvTable, columns: LogColumns) -> list[str]:

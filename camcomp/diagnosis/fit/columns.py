@@ -110,12 +110,6 @@ class Columns:
             np.array([n.startswith(tuple(f"{each} " for each in EFFECT_OF)) for n in self.names], bool)
         )
 
-    @cached_property
-    def run_offsets(self) -> Ints:
-        """Columns by which the measured tip of one run may differ from that of the next."""
-        tips = tuple(f".{name}" for name in channel_names(())[:3])
-        return np.flatnonzero(np.array([n.startswith("offset.") and n.endswith(tips) for n in self.names], bool))
-
 
 def candidate_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, float]) -> list[list[Floats]]:
     """Columns at nominal of an candidate's parameters, per run (n, c), in units of their scales; shape: scanned values."""

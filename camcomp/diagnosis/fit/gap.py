@@ -6,7 +6,7 @@ from camcomp.diagnosis.fit.bench import CandidateCause, cause_of
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics import places
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
@@ -22,15 +22,10 @@ def main_channels(problem: Problem) -> slice:
     return slice(3 + 2 * m, 6 + 2 * m)
 
 
-def gap_sizes(problem: Problem, f: Fitted, members: Members = ()) -> Floats:
-    """Length (n,), um, of the gap at all known rows of all runs, with the offsets of labels from the fit f removed.
-
-    members: those of f that are not to count to the gap either.
-    """
+def gap_sizes(problem: Problem, f: Fitted) -> Floats:
+    """Length (n,), um, of the gap at all known rows of all runs, with the offsets of labels from the fit f removed."""
     part = main_channels(problem)
-    every = dict(zip(f.members, problem.causes(f.members, f.theta, f.extra), strict=True))
-    known = [every[i] for i in members]
-    gaps = [problem.bench.gap(k, of_labels + known)[:, part] for k, of_labels in enumerate(_label_causes(problem, f))]
+    gaps = [problem.bench.gap(k, of_labels)[:, part] for k, of_labels in enumerate(_label_causes(problem, f))]
     # the gap is formed from the axes that were measured
     size = np.concatenate(
         [np.where(np.isfinite(g).any(axis=1), np.sqrt(np.nansum(g**2, axis=1)), np.nan) for g in _together(gaps)]

@@ -8,6 +8,7 @@ import numpy as np
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run
 from camcomp.diagnosis.fit.columns import Columns
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name, scatter, scattering
+from camcomp.diagnosis.statistics.noise_model import weighted_median
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
@@ -54,20 +55,11 @@ def _offset(twin: Twin, runs: Sequence[Run]) -> float:
             use = np.isfinite(ahead) & (v > 0.0)
             late.append(-ahead[use] / v[use] ** 2)
             speed.append(v[use])
-        change = _middle(np.concatenate(late), np.concatenate(speed))
+        change = weighted_median(np.concatenate(late), np.concatenate(speed))
         offset += change
         if abs(change) < SETTLED_S:
             break
     return offset
-
-
-def _middle(values: Floats, weights: Floats) -> float:
-    """Weighted median; 0 of an empty array."""
-    if not len(values):
-        return 0.0
-    order = np.argsort(values)
-    done = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(done, 0.5 * done[-1])])
 
 
 def with_scatter(columns: Columns, bench: Bench, amplitude: Floats) -> Columns:

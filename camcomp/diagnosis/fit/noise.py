@@ -8,7 +8,7 @@ from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.floor import NoiseFloor, row_scatter
 from camcomp.diagnosis.fit.starts import unknown_starts
 from camcomp.diagnosis.model.noise import MINOR, rounding_noise
-from camcomp.diagnosis.statistics.noise_model import Noise
+from camcomp.diagnosis.statistics.noise_model import Noise, weighted_median
 from camcomp.ground.datatypes import Floats
 
 TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
@@ -169,9 +169,9 @@ def jitter(bench: Bench) -> float:
     if not found:
         return 0.0
     gain, reach = np.array(found).T
-    order = np.argsort(gain)  # the axes that would see it best have the most to say
-    at = np.searchsorted(np.cumsum(reach[order] ** 2), 0.5 * np.sum(reach**2))
-    variance = min(float(gain[order][at]), UNSTEADY_S**2)
+    variance = min(
+        weighted_median(gain, reach**2), UNSTEADY_S**2
+    )  # the axes that would see it best have the most to say
     return float(np.sqrt(variance)) if variance * MIDDLE * float(reach.max()) > MINOR else 0.0
 
 

@@ -123,7 +123,6 @@ class TermBench(TermRows):
     def __init__(self, bench: Bench, noise: Noise, inflate: Sequence[Floats], times: Sequence[Floats]) -> None:
         self.bench, self.noise, self.inflate, self.times = bench, noise, inflate, times
         self._rows: dict[tuple[str, int], list[Rows]] = {}
-        self._ways: dict[Spot, list[Floats]] = {}
         self._squares: dict[Spot, list[Floats]] = {}
         self._reaches: dict[tuple[Spot, int], tuple[list[int], Floats]] = {}
 
@@ -156,23 +155,16 @@ class TermBench(TermRows):
 
     def tip_ways(self, spot: Spot) -> list[Floats]:
         """By how much the tip (n, 3), program frame, moves per unit at the spot, per run."""
-        if spot not in self._ways:
-            self._ways[spot] = self._tip_ways(spot)
-        return self._ways[spot]
+        if spot.on in ("control", "drive"):
+            return [self.bench.row_slopes(k)[:, :, spot.index] for k in range(len(self.bench.runs))]
+        return [np.tile(np.eye(3)[spot.index], (n, 1)) for n in self.row_counts]
 
     def rms(self, spot: Spot, values: Sequence[Floats]) -> Floats:
         """By how much each of functions (n, f) at a spot moves the tip (f,), per unit of its coefficient: over all rows."""
         if spot not in self._squares:
             self._squares[spot] = [np.sum(way**2, axis=1) for way in self.tip_ways(spot)]
-        ways = self._squares[spot]
-        energy = np.sum([way @ v**2 for way, v in zip(ways, values, strict=True)], axis=0)
-        return np.asarray(np.sqrt(energy / sum(len(v) for v in values)))
-
-    def _tip_ways(self, spot: Spot) -> list[Floats]:
-        bench = self.bench
-        if spot.on in ("control", "drive"):
-            return [bench.row_slopes(k)[:, :, spot.index] for k in range(len(bench.runs))]
-        return [np.tile(np.eye(3)[spot.index], (len(run.run_path.time), 1)) for run in bench.runs]
+        energy = np.sum([way @ v**2 for way, v in zip(self._squares[spot], values, strict=True)], axis=0)
+        return np.asarray(np.sqrt(energy / sum(self.row_counts)))
 
     def moves(self, spot: Spot, values: Sequence[Floats]) -> list[Floats]:
         """What functions (n, f) at a spot do to the tip (n', 3, f), thinned, per run."""

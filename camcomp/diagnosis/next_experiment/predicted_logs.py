@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 
@@ -14,11 +14,11 @@ from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import build
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.noise import inflation
+from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import LARGE
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.next_experiment.candidates import Candidate
-from camcomp.diagnosis.next_experiment.site import CHANNELS
 from camcomp.diagnosis.search.indistinguishable import HIDDEN
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
@@ -149,15 +149,9 @@ def _noise(problem: Problem) -> Floats:
     return np.where(known.any(axis=0), sigma, np.repeat(np.array(USUAL_NOISE), [3, m, m, 3]))
 
 
-def _parts(problem: Problem) -> dict[str, tuple[int, int]]:
-    m = len(problem.bench.actuators)
-    ends = [int(v) for v in np.cumsum((0, 3, m, m, 3))]
-    return dict(zip(CHANNELS, pairwise(ends), strict=True))
-
-
 def _sizes(problem: Problem) -> dict[str, float]:
     sigma = _noise(problem)
-    return {kind: float(np.sqrt(np.mean(sigma[a:b] ** 2))) for kind, (a, b) in _parts(problem).items()}
+    return {kind: float(np.sqrt(np.mean(sigma[problem.channels_of(kind)] ** 2))) for kind in KINDS}
 
 
 def _whitened(problem: Problem, bench: Bench, values: Floats) -> dict[str, Floats]:
@@ -165,10 +159,11 @@ def _whitened(problem: Problem, bench: Bench, values: Floats) -> dict[str, Float
     noise = replace(problem.noise, sigma=_noise(problem)[None, :])
     inflate = np.sqrt(1.0 + (inflation(bench)[0] / noise.sigma) ** 2)
     time = bench.runs[0].run_path.time
+    parts = {kind: problem.channels_of(kind) for kind in KINDS}
     return {
-        kind: noise.rows(0, values[:, a:b], inflate, time, a)
-        for kind, (a, b) in _parts(problem).items()
-        if np.isfinite(inflate[:, a:b]).any()
+        kind: noise.rows(0, values[:, part], inflate, time, part.start)
+        for kind, part in parts.items()
+        if np.isfinite(inflate[:, part]).any()
     }
 
 

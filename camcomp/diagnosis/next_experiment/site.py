@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, Run
+from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.ground.datatypes import RAPID, Bools, Floats
 from camcomp.ground.errors import PhysicsError
 from camcomp.model.job import Job
 from camcomp.model.motion.twin import Twin
 
-CHANNELS = ("tip", "encoder", "drive", "dyno")
 STRETCH = 2.5  # largest ratio of the tip's motion per drive motion to that of the runs (nearness to singular poses)
 FARTHER = 2.0  # half widths of the work: largest distance of an experiment
 FARTHER_MM = 80.0  # the same for a small region of work
@@ -75,7 +75,7 @@ def site_of(bench: Bench, job: Job) -> Site:
         work=_place(tips, feeds), cut=_place(tips[every], cutting) if every.any() else None,
         low=_low(bench, each, loaded), room=Room(bench.twin, np.array(job.machine.limits, float), tips),
         end=max(run.run_path.started + float(run.run_path.time[-1]) for run in bench.runs),
-        channels=tuple(c for c in CHANNELS if any(run.measured.has(c) for run in bench.runs)),
+        channels=tuple(c for c in KINDS if any(run.measured.has(c) for run in bench.runs)),
     )  # fmt: skip
 
 

@@ -113,3 +113,12 @@ def effective_rows(noise: Noise, channel: int, n: int) -> float:
     """How many independent rows n correlated ones are worth for a mean."""
     slow, memory = noise.slow[:, channel], np.maximum(noise.memory[:, channel], 0.0)
     return n / float(np.mean(1.0 + 2.0 * slow * memory / (1.0 - memory)))
+
+
+def weighted_median(values: Floats, weights: Floats) -> float:
+    """The value of (n,) with half of the weights (n,) on either side; 0 of none."""
+    if not len(values):
+        return 0.0
+    order = np.argsort(values)
+    done = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(done, 0.5 * done[-1])])
