@@ -21,7 +21,7 @@ from camcomp.diagnosis.arm.pose_values import of_poses
 from camcomp.diagnosis.arm.poses import ArmBench, Poses, combined
 from camcomp.diagnosis.arm.temporary_offsets import EFFECT as SPELL
 from camcomp.diagnosis.arm.temporary_offsets import temporary_offsets
-from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrinkage
+from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrinkage, without_far_judged
 from camcomp.diagnosis.model.discrepancy import residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.explain import Explanation, KnownNoise, explain
@@ -277,6 +277,7 @@ def studied(
             stated=StatedDeviation() if stated is None else stated,
         )  # fmt: skip
     bench = case.bench
+    case = without_far_judged(case)
     case = replace(case, check=check_held_out(case))
     progress.done(0.8)
     named, minor = answer.causes(case)

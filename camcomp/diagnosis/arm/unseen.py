@@ -12,9 +12,10 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.answer.unseen import PARTS, JudgedRun, unseen_shrinkage
-from camcomp.diagnosis.arm.case import PoseCase
+from camcomp.diagnosis.arm.case import PoseCase, named_rows
 from camcomp.diagnosis.arm.curves import covered, seen_angles
-from camcomp.diagnosis.arm.poses import CURVE
+from camcomp.diagnosis.arm.noise_floor import far_off
+from camcomp.diagnosis.arm.poses import CURVE, ArmBench
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.folds import Excess, excess_of, folds_of, held_out, without_nuisances
 from camcomp.diagnosis.model.group import split_regions
@@ -35,6 +36,21 @@ def check_held_out(case: PoseCase) -> Excess | None:
     background = Background(families=found.background.families)
     parts = held_out(case.model, background, found.members, folds_of(case.model))
     return excess_of(case.model, parts, case.floor.freedom)
+
+
+def without_far_judged(case: PoseCase) -> PoseCase:
+    """The case without withheld poses that are outliers of the fitted causes."""
+    bench, causes = case.bench, case.causes
+    campaigns, groups, outliers = list(bench.campaigns), list(case.model.groups), list(case.outliers)
+    for k in range(len(bench.own), len(campaigns)):
+        far = far_off(np.linalg.norm(bench.gap(k, causes), axis=1), campaigns[k].time)
+        outliers += named_rows(campaigns[k], far)
+        campaigns[k], groups[k] = campaigns[k].take(~far), groups[k].take(~far)
+    if len(outliers) == len(case.outliers):
+        return case
+    model = replace(case.model, groups=tuple(groups))
+    bench = ArmBench(robot=bench.robot, causes=bench.causes, campaigns=campaigns, fitted=bench.fitted)
+    return replace(case, bench=bench, explanation=replace(case.explanation, model=model), outliers=tuple(outliers))
 
 
 def acting(named: Sequence[FoundCause]) -> list[Cause]:
