@@ -20,7 +20,7 @@ from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.solve import FREE, TARGET, State, inverse, solve
 from camcomp.model.statics.target import Correction, correct, settle
 
-MOST_STEPS, STEP_MM = 20, 1e-6  # the slopes of a cube are those of its centre: every step leaves a tenth
+MOST_STEPS, STEP_MM = 20, 1e-5  # the slopes of a cube are those of its centre: every step leaves a tenth
 LEAST_MOTIONS = 2000  # from which new cubes pay
 COARSE_MM = 1e-3  # from a command: farther ones are not taken for its first order
 

@@ -65,9 +65,9 @@ class EngagementArcs:
         return np.where(same, self.start, np.pi - self.stop), np.where(same, self.stop, np.pi - self.start)
 
 
-@dataclass(frozen=True, eq=False)
-class EngagedAt:
-    """Places (k,) along the motions of a path, in order; between them the engagement is linear.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Engaged:
+    """Places (k,) along the motions of a path, in order, with the engagement arcs; between them the engagement is linear.
 
     Two places at one fraction of a motion are a jump. Motions without places do not cut.
     """
@@ -76,40 +76,6 @@ class EngagedAt:
     u: Floats  # (k,) fraction of the motion
     depth: Floats  # (k,) mm, the highest material over the tip
     turn: Floats  # (k,) rad, sum of the engaged arcs
-
-    def around(self, motion: Ints, u: Floats) -> tuple[Ints, Ints, Bools]:
-        """Rows of the places before and after points (n,) of motions, and mask (n,) of points that have both."""
-        n = len(self.u)
-        right = np.clip(np.searchsorted(self.motion + 0.5 * self.u, motion + 0.5 * u), min(1, n), max(n - 1, 0))
-        left = np.maximum(right - 1, 0)
-        known = (self.motion[left] == motion) & (self.motion[right] == motion) & (left < right) if n else right < left
-        return left, right, known
-
-    def between(self, motion: Ints, u: Floats, behind: Bools) -> tuple[Ints, Ints, Floats]:
-        """Rows of the places on both sides of points (n,) of motions with places, and the share of the second one.
-
-        behind (n,): after a jump at the point, otherwise before it.
-        """
-        hair = np.where(behind, 1e-9, -1e-9)
-        left, right, known = self.around(motion, np.clip(u + hair, 1e-12, 1.0 - 1e-12))
-        span = np.where(known, self.u[right] - self.u[left], 0.0)
-        share = np.clip(np.divide(u - self.u[left], span, out=np.zeros(len(u)), where=span > 0.0), 0.0, 1.0)
-        return left, right, share
-
-    def sizes(self, motion: Ints, u: Floats, behind: Bools) -> tuple[Floats, Floats]:
-        """Depth (n,) mm and sum of the arcs (n,) rad at points (n,) of motions; zero on motions without places."""
-        depth, turn = np.zeros(len(u)), np.zeros(len(u))
-        on = np.flatnonzero(np.isin(motion, self.motion))
-        left, right, share = self.between(motion[on], u[on], behind[on])
-        depth[on] = (1.0 - share) * self.depth[left] + share * self.depth[right]
-        turn[on] = (1.0 - share) * self.turn[left] + share * self.turn[right]
-        return depth, turn
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Engaged(EngagedAt):
-    """Places with the engagement arcs that determine the force."""
-
     bends: Bools  # (k,) the place determines the force; others only depth and sum of the arcs
     arcs: EngagementArcs
 
@@ -149,6 +115,34 @@ class Engaged(EngagedAt):
         """The places of motions first to last (excluded), renumbered from `number`."""
         out = self.take(np.arange(np.searchsorted(self.motion, first), np.searchsorted(self.motion, last)))
         return replace(out, motion=out.motion - first + number)
+
+    def around(self, motion: Ints, u: Floats) -> tuple[Ints, Ints, Bools]:
+        """Rows of the places before and after points (n,) of motions, and mask (n,) of points that have both."""
+        n = len(self.u)
+        right = np.clip(np.searchsorted(self.motion + 0.5 * self.u, motion + 0.5 * u), min(1, n), max(n - 1, 0))
+        left = np.maximum(right - 1, 0)
+        known = (self.motion[left] == motion) & (self.motion[right] == motion) & (left < right) if n else right < left
+        return left, right, known
+
+    def between(self, motion: Ints, u: Floats, behind: Bools) -> tuple[Ints, Ints, Floats]:
+        """Rows of the places on both sides of points (n,) of motions with places, and the share of the second one.
+
+        behind (n,): after a jump at the point, otherwise before it.
+        """
+        hair = np.where(behind, 1e-9, -1e-9)
+        left, right, known = self.around(motion, np.clip(u + hair, 1e-12, 1.0 - 1e-12))
+        span = np.where(known, self.u[right] - self.u[left], 0.0)
+        share = np.clip(np.divide(u - self.u[left], span, out=np.zeros(len(u)), where=span > 0.0), 0.0, 1.0)
+        return left, right, share
+
+    def sizes(self, motion: Ints, u: Floats, behind: Bools) -> tuple[Floats, Floats]:
+        """Depth (n,) mm and sum of the arcs (n,) rad at points (n,) of motions; zero on motions without places."""
+        depth, turn = np.zeros(len(u)), np.zeros(len(u))
+        on = np.flatnonzero(np.isin(motion, self.motion))
+        left, right, share = self.between(motion[on], u[on], behind[on])
+        depth[on] = (1.0 - share) * self.depth[left] + share * self.depth[right]
+        turn[on] = (1.0 - share) * self.turn[left] + share * self.turn[right]
+        return depth, turn
 
 
 Engage = Callable[[Path], Engaged]

@@ -302,11 +302,8 @@ def _components(
     return out
 
 
-def base_of(path: Path, c: Conditions, engaged: Engaged, length: Floats, *, extent: bool = True) -> Floats:
-    """Fr, Ft, Fz (k, 3) N of the model at the places of the engagement where the tool cuts, and at those next to them.
-
-    extent: the model uses the width of the cut; those of camcomp need the arcs only.
-    """
+def base_of(path: Path, c: Conditions, engaged: Engaged, length: Floats) -> Floats:
+    """Fr, Ft, Fz (k, 3) N of the model at the places of the engagement where the tool cuts, and at those next to them."""
     near = engaged.turn > 0.0
     on, beside = near.copy(), engaged.motion[1:] == engaged.motion[:-1]
     near[1:] |= on[:-1] & beside
@@ -317,14 +314,13 @@ def base_of(path: Path, c: Conditions, engaged: Engaged, length: Floats, *, exte
         where, u, arcs = engaged.motion[rows], engaged.u[rows], engaged.arcs.of(rows)
         direction = _in_tool_frame(path, where, u, path_geometry.tangents(path, where, u))
         s = np.concatenate(([0.0], np.cumsum(length)))[where] + u * length[where]
-        reach = arcs.reach(len(rows)) if extent else np.full(len(rows), np.nan)
         base[rows] = _components(
             path=path,
             c=c,
             motion=where,
             direction=direction,
             depth=engaged.depth[rows],
-            width=reach,
+            width=arcs.reach(len(rows)),
             s=s,
             ends=u == 1.0,
             arcs=arcs,
