@@ -34,8 +34,13 @@ def arm(longer_mm: float = 0.0) -> mujoco.MjModel:
     )
 
 
-def settle(model: mujoco.MjModel, q: np.ndarray, rad_per_Nm: float) -> np.ndarray:
+def settle(model: mujoco.MjModel, q: np.ndarray, rad_per_Nm: float = 0.0) -> np.ndarray:
     """Tip (3,) mm, machine frame, at joint angles q (6,), joints and pedestal deflected by the weight."""
+    return 1e3 * settled(model, q, rad_per_Nm).site_xpos[0]
+
+
+def settled(model: mujoco.MjModel, q: np.ndarray, rad_per_Nm: float = 0.0) -> mujoco.MjData:
+    """The arm at rest under its weight."""
     data = mujoco.MjData(model)
     soft = np.array([rad_per_Nm, rad_per_Nm, *(1e3 / row[4] for row in ROWS)])
     told = np.array([0.0, 0.0, *q])
@@ -44,7 +49,47 @@ def settle(model: mujoco.MjModel, q: np.ndarray, rad_per_Nm: float) -> np.ndarra
         mujoco.mj_forward(model, data)
         data.qpos[:] = told - soft * data.qfrc_bias
     mujoco.mj_forward(model, data)
-    return 1e3 * data.site_xpos[0]
+    return data
+
+
+# What no library lists: how far joints (6,) rad give way further, or the tip (3,) mm of MuJoCo moves further. q, speed (6,) rad, rad/s;
+# t s on the common clock; before: what the effect remembers of earlier rows.
+
+
+def hose(q: np.ndarray) -> np.ndarray:
+    """A hose pulls A1 and A4 back to a middle, the harder the further it is bent, up to 400 N m."""
+    off = np.tanh((q - np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])) / 0.15) * np.array([1, 0, 0, 1, 0, 0])
+    return np.asarray(-400.0 * off * np.abs(off) * 1e3 / np.array([row[4] for row in ROWS]))
+
+
+def bent_upper_arm(model: mujoco.MjModel, q: np.ndarray) -> np.ndarray:
+    """The upper arm bends under the moments at its two ends, as a beam does."""
+    data = mujoco.MjData(model)
+    data.qpos[2:] = q
+    mujoco.mj_forward(model, data)
+    shoulder, elbow = data.qfrc_bias[3:5]
+    return np.array([0.0, -0.25e-7 * (shoulder + 2.0 * elbow), -0.75e-7 * (shoulder + elbow), 0.0, 0.0, 0.0])
+
+
+def sloshing(q: np.ndarray, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A tank on the forearm turns A1 by how far its liquid, 0.8 s behind, is off; and where that is a row of 0.05 s later."""
+    liquid = before + (0.05 / 0.8) * (q - before)
+    return np.eye(6)[0] * 4e-3 * (q - liquid)[0], liquid
+
+
+def growing_spindle(axis: np.ndarray, t: float) -> np.ndarray:
+    """The spindle grows along its axis (3,) as it warms up, and with the hall's day."""
+    return 0.06 * (1.0 - np.exp(-t / 600.0)) * (0.5 + 0.5 * np.sin(t / 200.0)) * axis
+
+
+def soft_floor(q: np.ndarray, tip: np.ndarray) -> np.ndarray:
+    """The floor sinks on the side to which the arm is turned."""
+    return np.cross([0.0, 1.5e-3 * max(np.cos(q[0] - 0.4) - 0.93, 0.0), 0.0], tip)
+
+
+def wobbling_bearing(q: np.ndarray) -> np.ndarray:
+    """The bearing of A3 wobbles along its axis, 17 times per turn."""
+    return 0.04 * np.sin(17.0 * q[2] + 0.6) * np.array([-np.sin(q[0]), np.cos(q[0]), 0.0])
 
 
 def _text(values: np.ndarray) -> str:
