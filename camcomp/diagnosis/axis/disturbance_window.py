@@ -1,55 +1,75 @@
-"""In which rows of one run may the drive force of an axis be shifted by a disturbance?"""
+"""Is there a disturbance force: a window of one run in which the drive force of an axis is shifted?"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.diagnosis.model.window import best_window
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
 
 CELL_S = 0.02  # in which a window begins and ends, before it is placed to a row
 SHORTEST_S = 0.2  # of a window
+LEVEL = 0.5  # of the shift: every quarter of a window has to show it to within that
+QUARTERS = 4
+LEAST_SIZE = 2.0  # of the floor, that a push has to be: a force's zero wanders by less
+PLACES = 40  # of the travel, each way of its own
+BEEN = 0.5  # of a window's rows, at places where the axis was at other times as well
 FARTHEST = 3  # cells by which an end is moved to its row
+SHARP_S, SHARP = (
+    0.02,
+    0.6,
+)  # beyond an end, at least two rows; of the shift that has to be gone there: no place ends like that
 
 
 @dataclass(frozen=True)
 class Window:
-    """Rows first to last (exclusive) of a run, counted from 0."""
+    """Rows first to last (exclusive) of a run, counted from 0; shift N."""
 
     run: int
     first: int
     last: int
+    shift: float
 
 
 def find_window(
-    values: Mapping[int, Floats], beside: Mapping[int, Floats], times: Mapping[int, Floats]
-) -> Window | None:
-    """The window of forces (n,) N by run in which a shift explains most.
+    values: Mapping[int, Floats], beside: Mapping[int, Floats], times: Mapping[int, Floats], floor: float
+) -> tuple[Window, Floats] | None:
+    """The window of forces (n,) N that explains most, where it is a push: as large throughout as it is on average; by run.
 
-    beside: columns (n, k) that are fitted to the same runs, so that friction and inertia have no part in how long it lasts.
+    beside: columns (n, k) that are fitted to the same runs, so that friction and inertia have no part in how long a push lasts.
+    With what all else leaves of the window's run (n,), the push still in it.
     """
     rests, bases = _projected(values, beside)
-
-    def best(k: int, edges: Ints, shortest: int) -> tuple[float, int, int]:
-        return best_window(np.ones((len(rests[k]), 1)), rests[k][:, None], bases[k][:, None], edges, shortest)
-
-    cells = {
-        k: max(round(CELL_S / float(np.median(np.diff(times[k])))), 1, len(rest) // 400) for k, rest in rests.items()
-    }
-    rows = {k: max(round(SHORTEST_S / float(np.median(np.diff(times[k])))), 2) for k in rests}
-    coarse = {k: best(k, np.arange(0, len(rest) - cells[k] + 1, cells[k]), rows[k]) for k, rest in rests.items()}
-    k = max(coarse, key=lambda each: coarse[each][0])
-    if not coarse[k][0] > 0.0:
+    best: tuple[float, int, int, int] | None = None
+    for k, rest in rests.items():
+        step = float(np.median(np.diff(times[k])))
+        cell = max(round(CELL_S / step), 1, len(rest) // 400)
+        edges, shortest = np.arange(0, len(rest) - cell + 1, cell), cell * max(round(SHORTEST_S / (cell * step)), 2)
+        score, first, last = best_window(np.ones((len(rest), 1)), rest[:, None], bases[k][:, None], edges, shortest)
+        if score > (best[0] if best else 0.0):
+            best = score, k, first, last
+    if best is None:
         return None
-    near = np.arange(-FARTHEST * cells[k], FARTHEST * cells[k] + 1)
-    edges = np.unique(np.clip([end + near for end in coarse[k][1:]], 0, len(rests[k])))
-    _, first, last = best(k, edges, rows[k])
-    return Window(k, first, last) if times[k][last - 1] - times[k][first] >= SHORTEST_S else None
+    _, k, first, last = best
+    shift, rest = _alone(rests[k], bases[k], first, last)
+    step = float(np.median(np.diff(times[k])))
+    first, last = _placed(rest, first, last, FARTHEST * max(round(CELL_S / step), 1, len(rest) // 400))
+    shift, rest = _alone(rests[k], bases[k], first, last)
+    if abs(shift) < LEAST_SIZE * floor or times[k][last - 1] - times[k][first] < SHORTEST_S:
+        return None
+    # it takes a while to come and to go: rows at its ends are not as high as it is
+    inside, outside = away_from_ends(first, last, times[k])
+    shift = _step(rests[k], inside, outside) / _step(_seen(bases[k], first, last), inside, outside)
+    parts = [float(np.mean(p) - np.mean(rest[outside])) for p in np.array_split(rest[inside], QUARTERS)]
+    if not all(abs(p - shift) < LEVEL * abs(shift) for p in parts):
+        return None
+    return Window(k, first, last, shift), rest
 
 
 def _projected(
@@ -67,7 +87,83 @@ def _projected(
     return rests, bases
 
 
+def _step(values: Floats, inside: Bools, outside: Bools) -> float:
+    return float(np.mean(values[inside]) - np.mean(values[outside]))
+
+
+def _seen(base: Floats, first: int, last: int) -> Floats:
+    """A unit disturbance force in a window (n,) minus its projection on a basis (n, k)."""
+    push = np.zeros(len(base))
+    push[first:last] = 1.0
+    return np.asarray(push - base @ base[first:last].sum(axis=0))
+
+
+def _alone(rest: Floats, base: Floats, first: int, last: int) -> tuple[float, Floats]:
+    """Size of a window, fitted jointly with a basis (n, k), and the run (n,) minus the basis part of that fit."""
+    inside = base[first:last].sum(axis=0)
+    shift = float(rest[first:last].sum() / max(last - first - float(inside @ inside), 1e-300))
+    return shift, np.asarray(rest + shift * (base @ inside))
+
+
+def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
+    """Whether the axis was where the window was at other times as well, the same way: else it may be the place that pushes."""
+    every = np.concatenate([m.position for m in moves])
+    low, span = float(every.min()), max(float(np.ptp(every)), 1e-9)
+
+    def places(m: AxisTravel) -> Ints:
+        place = np.minimum((PLACES * (m.position - low) / span).astype(int), PLACES - 1)
+        return np.asarray(3 * place + np.sign(np.round(m.speed, 6)).astype(int) + 1)
+
+    at = [places(m) for m in moves]
+    mine = at[window.run][window.first : window.last]
+    others = [np.delete(p, slice(window.first, window.last)) if k == window.run else p for k, p in enumerate(at)]
+    return float(np.isin(mine, np.concatenate(others)).mean()) > BEEN
+
+
+def away_from_ends(first: int, last: int, time: Floats) -> tuple[Bools, Bools]:
+    """Rows (n,) inside a window and outside of it that are further than SHARP_S from both of its ends; all, where none are."""
+    far = ~_at_ends(first, last, time)
+    inside = np.zeros(len(time), bool)
+    inside[first:last] = True
+    inside, outside = (on & far if np.any(on & far) else on for on in (inside, ~inside))
+    return inside, outside
+
+
+def _at_ends(first: int, last: int, time: Floats) -> Bools:
+    ends = time[[first, min(last, len(time) - 1)]]
+    return np.asarray(np.min(np.abs(time[:, None] - ends), axis=1) < SHARP_S)
+
+
+def sharp(window: Window, rest: Floats, time: Floats) -> bool:
+    """Whether residuals (n,) N of the window's run jump at both of its ends, and both lie inside the run."""
+    reach = max(round(SHARP_S / float(np.median(np.diff(time)))), 2)
+    if window.first < reach or window.last + reach > len(rest):
+        return False
+    ends = [(window.first, -1), (window.last, 1)]
+    jumps = [np.mean(_beside(rest, at, -side, reach)) - np.mean(_beside(rest, at, side, reach)) for at, side in ends]
+    return all(float(jump) / window.shift > SHARP for jump in jumps)
+
+
 def rising(push: Floats, time: Floats, rise_s: float) -> Floats:
     """What a force (n,) N in a window is not known to where it comes and goes, row by row: half of what it changes by."""
     reach = 2 * max(round(rise_s / float(np.median(np.diff(time)))), 1) + 1
     return np.asarray(0.5 * (maximum_filter1d(push, reach) - minimum_filter1d(push, reach)))
+
+
+def _beside(rest: Floats, at: int, side: int, reach: int) -> Floats:
+    return rest[at : at + reach] if side > 0 else rest[at - reach : at]
+
+
+def _placed(rest: Floats, first: int, last: int, reach: int) -> tuple[int, int]:
+    """Both ends moved by up to `reach` rows to where the step is."""
+
+    def step_at(near: int) -> int:
+        low, high = max(near - reach, 1), min(near + reach, len(rest) - 1)
+        a, b = max(low - reach, 0), min(high + reach, len(rest))
+        cuts = np.arange(low, high + 1)
+        sums = np.concatenate([[0.0], np.cumsum(rest[a:b])])
+        n, m = cuts - a, b - cuts
+        before, behind = sums[cuts - a] / n, (sums[-1] - sums[cuts - a]) / np.maximum(m, 1)
+        return int(cuts[np.argmax((before - behind) ** 2 * n * m)])
+
+    return (step_at(first) if first > 0 else 0), step_at(last)

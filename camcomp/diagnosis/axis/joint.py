@@ -19,7 +19,7 @@ import numpy as np
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.channel_data import TURNING, ChannelData, Response, healthy_sizes
 from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel
-from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising
+from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun, ChannelRun
 from camcomp.diagnosis.axis.gate import WITHIN, AxisGate, judge, not_known
@@ -270,8 +270,11 @@ def _with_pushes(
     for _ in range(CAUSES):
         beside = {k: data.healthy_columns(k) for k in data.train}
         left = {k: done.left[k] for k in data.train}
-        window = find_window(left, beside, {k: rows.moves[k].time for k in left})
-        if window is None:
+        found = find_window(left, beside, {k: rows.moves[k].time for k in left}, data.floor)
+        if found is None:
+            break
+        window, rest = found
+        if not (sharp(window, rest, rows.moves[window.run].time) or seen_elsewhere(window, rows.moves)):
             break
         more = [*pushes, _push(name, window, rows)]
         again = fit_channel(data, [*terms, *more])

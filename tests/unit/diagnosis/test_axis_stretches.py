@@ -19,10 +19,11 @@ def pushed(first, last, rows):
     return np.convolve(push, np.full(RAMP, 1.0 / RAMP), "same")
 
 
-def test_a_push_is_placed_to_the_row():
+def test_rows_in_which_a_push_comes_and_goes_do_not_lower_it():
     time = 1e-3 * np.arange(4000)
     force = pushed(1500, 2000, 4000) + NOISE * np.random.default_rng(0).standard_normal(4000)
-    window = find_window({0: force}, {0: np.sin(3.0 * time)[:, None]}, {0: time})
+    window, _ = find_window({0: force}, {0: np.sin(3.0 * time)[:, None]}, {0: time}, NOISE)
+    assert window.shift == pytest.approx(FORCE, abs=4.0 * NOISE / np.sqrt(460))
     assert abs(window.first - 1500) <= 1 and abs(window.last - 2000) <= 1
 
 
