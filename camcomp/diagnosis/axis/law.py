@@ -31,22 +31,26 @@ from camcomp.model.law.covariates import REFERENCE_C
 TURN_MM = 0.02  # way over which a reversal changes the sense
 WAVES = ("sin(2*pi*act_mm/{0})", "cos(2*pi*act_mm/{0})")
 ONE_WAY = (f"max(way(act_mm, {TURN_MM}), 0)", f"max(-way(act_mm, {TURN_MM}), 0)")
+FIXED = 1e6  # of what the rows tell of a size: it stays
 FIT_AGAIN = 2  # searches: the noise of the first one has the law in it
 
 
 class AxisRows(TermRows):
     """Residuals of one channel of an axis: of a drive force, N, or of an encoder, mm.
 
-    left: residuals (n,) per run. noise: standard deviation of a row that counts as one of its own.
+    left: residuals (n,) per run. noise: standard deviation of a row that counts as one of its own. held: whether the causes
+    keep their sizes beside a law, as in a machine file that it is written to.
     """
 
-    def __init__(self, name: str, channel: AxisChannel, moves: Sequence[AxisTravel], *, force: bool) -> None:
+    def __init__(
+        self, name: str, channel: AxisChannel, moves: Sequence[AxisTravel], *, force: bool, held: bool = False
+    ) -> None:
         self.spot, self._name, self.moves = Spot("force" if force else "control", 0), name, moves
         self.left = [each if force else -each for each in channel.left]  # set-point minus encoder is what is studied
         self.floor, self.wide = channel.floor, float(np.sqrt(np.mean(channel.rows**2)))
         self.noise = noise_of(np.concatenate(self.left), channel.floor)
         size = np.sqrt(np.mean(channel.columns**2, axis=0)) + 1e-300
-        self._taken = np.linalg.qr(channel.columns / size)[0]
+        self._taken, self._held = np.linalg.qr(channel.columns / size)[0], held
         self._base = np.split(channel.columns / size, np.cumsum(self.row_counts)[:-1])
 
     @property
@@ -88,11 +92,11 @@ class AxisRows(TermRows):
 
     def folds(self, split: Split) -> Folds:
         """Residuals with the columns that were fitted, each of them as large as the channel at most."""
-        every = np.arange(self._base[0].shape[1])
+        every, least = np.arange(self._base[0].shape[1]), sum(self.row_counts) / self.noise**2
         return Folds(
             white=[ByChannel(len(every), ((every, X / self.noise),)) for X in self._base],
             residual=[each / self.noise for each in self.left],
-            precision=np.full(len(every), self.wide**-2), split=split, constants=[],
+            precision=np.full(len(every), FIXED * least if self._held else self.wide**-2), split=split, constants=[],
             places=[(m.time - m.time[0]) / max(float(np.ptp(m.time)), 1e-12) for m in self.moves],
         )  # fmt: skip
 
@@ -125,24 +129,32 @@ def axis_law(
     if found is None:
         return None
     law = law_result(rows, found, *_sizes_um(rows, found))
+    second = _written(name, following, told, found) if following is not None else None
     if force is None:
-        return law
+        return second
     before, after = (1e-3 * each for each in (law.before_rms_um, law.after_rms_um))
     says = f"{law.says} The drive force of {name} goes from {before:.3g} N to {after:.3g} N (rms)."
-    if following is None:
-        return law.model_copy(update={"says": says})
-    also = AxisRows(name, following, told, force=False)
-    same = fitted(Shapes(also), [Term(also.spot, t.form) for t in found.terms], also.folds(usual_split(len(told))))
-    sizes = _sizes_um(also, same)
-    if sizes[1] > BETTER * sizes[0]:  # the gap itself does not show it
-        return law.model_copy(update={"says": says, "before_rms_um": sizes[0], "after_rms_um": sizes[0]})
-    second = law_result(also, same, *sizes)
+    if second is None:  # the gap itself does not show it
+        unchanged = {} if following is None else dict.fromkeys(("before_rms_um", "after_rms_um"), _size_um(following))
+        return law.model_copy(update={"says": says, **unchanged})
     return second.model_copy(
         update={
             "formula": f"{law.formula}; {second.formula}", "on": law.on, "terms": (*law.terms, *second.terms),
             "envelope": law.envelope | second.envelope, "says": says,
         }
     )  # fmt: skip
+
+
+def _written(name: str, following: AxisChannel, told: Sequence[AxisTravel], found: FoundLaw) -> Law | None:
+    """The terms of a law as a following error shows them beside its causes as they are; None where it does not."""
+    rows = AxisRows(name, following, told, force=False, held=True)
+    same = fitted(Shapes(rows), [Term(rows.spot, t.form) for t in found.terms], rows.folds(usual_split(len(told))))
+    before, after = _sizes_um(rows, same)
+    return None if after > BETTER * before else law_result(rows, same, before, after)
+
+
+def _size_um(channel: AxisChannel) -> float:
+    return round(1e3 * float(np.sqrt(np.mean(np.concatenate(channel.left) ** 2))), 3)
 
 
 def _found(rows: AxisRows) -> FoundLaw | None:

@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.axis.findings import AxisRun
-from camcomp.diagnosis.axis.law import axis_law
+from camcomp.diagnosis.axis.law import AxisRows, axis_law
 from camcomp.diagnosis.axis.study import studied
 from camcomp.diagnosis.axis.terms import travel
+from camcomp.diagnosis.law.bench_terms import Term
+from camcomp.diagnosis.law.describe import law_result
+from camcomp.diagnosis.law.find import fitted
+from camcomp.diagnosis.law.folds import usual_split
+from camcomp.diagnosis.law.forms import at_drive
 from camcomp.diagnosis.law.library import LearnedLaw
+from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.model.law.covariates import AT_DRIVE
 from camcomp.model.law.expression import parse
 
@@ -34,12 +40,12 @@ def axis_run(ripple, seed=0):
 @pytest.fixture(scope="module")
 def found():
     run, screw = axis_run(1.0)
-    result, _ = studied({"x": [run]})
-    return run, screw, result
+    result, (axis,) = studied({"x": [run]})
+    return run, screw, result, axis
 
 
 def test_a_ripple_comes_out_with_its_period_and_both_ways(found):
-    _, _, result = found
+    _, _, result, _ = found
     law = result.law
     assert result.verdict == "unknown" and law.on == "drive"
     forces = [each for each in law.terms if each.term.startswith("force x") and each.unit == "N"]
@@ -52,7 +58,7 @@ def test_a_ripple_comes_out_with_its_period_and_both_ways(found):
 
 
 def test_what_the_following_error_shows_of_it_goes_into_a_machine_file(found):
-    run, screw, result = found
+    run, screw, result, _ = found
     (part,) = result.law.parts
     assert (part.stage, part.target) == ("control", "x") and set(part.envelope) == {"act_mm"}
     said = parse(part.formula, dict.fromkeys(AT_DRIVE))({"act_mm": run.setpoint}, len(run.time))
@@ -80,3 +86,19 @@ def test_an_axis_that_stands_has_no_law():
     force = 3.0 + 5.0 * np.sin(9.0 * t) + 0.2 * rng.standard_normal(len(t))
     result, _ = studied({"x": [AxisRun(name="r", time=t, setpoint=still, encoder=still, force=force)]})
     assert result.law is None
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_a_law_of_a_machine_file_takes_no_size_that_only_other_causes_would_undo(found, held):
+    """What a power of the speed adds beside a lag that may change leaves more than before where the lag stays as it is."""
+    following = found[3].following
+    rows = AxisRows("x", following, [each.move for each in following.fitted], force=False, held=held)
+    forms = [f for f in at_drive(rows.sizes(rows.spot), False) if f.about == ("act_mm_per_s",)]
+    worse = []
+    for form in forms:
+        law = fitted(Shapes(rows), [Term(rows.spot, form)], rows.folds(usual_split(1)))
+        move = rows.moves[0]
+        at = {"act_mm": move.position, "act_mm_per_s": move.speed, "act_mm_per_s2": move.acceleration}
+        said = parse(law_result(rows, law, 1.0, 1.0).parts[0].formula, dict.fromkeys(AT_DRIVE))(at, len(move.time))
+        worse.append(np.std(rows.left[0] - said) / np.std(rows.left[0]))
+    assert len(worse) > 2 and (max(worse) < 1.001) == held
