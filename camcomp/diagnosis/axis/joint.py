@@ -30,7 +30,7 @@ from camcomp.diagnosis.law.words import law_sum
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.result.types import LawPart
 from camcomp.ground import shelf
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import PRESLIDING_MM
 
 TURNS_MM = (1e-4, 0.003, 0.02, 0.1)  # ways over which the friction of a slide turns round in its following error
@@ -98,12 +98,12 @@ def study_channel(found: AxisFindings, rows: JointRows, around: AxisSurroundings
     if rows.channel == "behind":  # without zeros and clocks of two encoders, the rest is an error of the machine
         apart = [sum(own[kind] @ done.sizes[kind] for kind in ("offset", "delay")) for own in data.healthy]
         rows = replace(rows, values=[each - own for each, own in zip(rows.values, apart, strict=True)])
-    channel = _channel(rows, done, data.response)
+    sure = [np.ones(len(each), bool) for each in rows.values]
     if following and done.acting:  # how well other rows are predicted says nothing of the causes
         behind = [term.cause(own.tolist()) for term, own in done.acting]
-        known = {rows.numbers[k]: axes[k].known(behind)[seen[k]] for k in rows.test}
-        kept = {n: on for n, on in known.items() if on.any() and not on.all()}
-        channel.runs = [r.of(kept[r.number]) if r.number in kept else r for r in channel.runs]
+        told = {k: axes[k].known(behind)[seen[k]] for k in rows.test}
+        sure = [told[k] if k in told and told[k].any() else own for k, own in enumerate(sure)]
+    channel = _channel(rows, done, data.response, sure)
     _tell(found, rows, done, data.healthy)
     if (
         rows.channel != "force" and float(np.std(channel.rows)) <= rows.floor
@@ -348,20 +348,23 @@ def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, healthy: Seque
     }
 
 
-def _channel(rows: JointRows, done: ChannelFit, response: Response) -> AxisChannel:
-    """Residuals of the fitted runs, and of those that are judged only, against the floor."""
+def _channel(rows: JointRows, done: ChannelFit, response: Response, sure: Sequence[Bools]) -> AxisChannel:
+    """Residuals of the fitted runs, and of those that are judged only, against the floor; sure (n,) per run: rows that count."""
     moves, values = rows.moves, rows.values
     constant = done.sizes["offset"][0] if rows.channel == "force" else 0.0
     pushing = [each for each in done.acting if each[0].run is not None]
     pushed = [response(k, pushing) for k in range(len(values))]
-    spread = float(np.sqrt(np.mean(np.concatenate([*rows.noise]) ** 2))) if rows.noise else 1.0
+    spread = 1.0
+    if rows.noise:  # as large as it is seen to be at most
+        floors = [(rows.noise[k], np.maximum(np.abs(done.left[k]) / rows.floor, 1.0)) for k in rows.train]
+        spread = float(np.sqrt(np.mean(np.concatenate([np.minimum(*each) for each in floors]) ** 2)))
     channel = AxisChannel(
         runs=[
             ChannelRun(
                 name=rows.runs[k].name, number=rows.numbers[k], fitted=k in rows.train, move=moves[k],
                 whole=rows.whole[k] if rows.whole else (moves[k].time, values[k]),
                 gap=values[k] - constant - (0.0 if k in rows.train else pushed[k]), left=done.left[k],
-            )
+            ).of(sure[k])
             for k in (*rows.train, *rows.test)
         ],
         floor=rows.floor * spread, stated=rows.stated, columns=done.columns,
@@ -375,5 +378,6 @@ def _channel(rows: JointRows, done: ChannelFit, response: Response) -> AxisChann
         left = [each / np.hypot(1.0, by / rows.floor) for each, by in zip(left, known, strict=True)]
     if rows.noise:
         left = [each / rows.noise[k] for k, each in zip(order, left, strict=True)]
-    channel.gate = judge(left, [moves[k].time for k in order], rows.floor, [rows.runs[k].name for k in order])
+    left = [each[sure[k]] for k, each in zip(order, left, strict=True)]
+    channel.gate = judge(left, [moves[k].time[sure[k]] for k in order], rows.floor, [rows.runs[k].name for k in order])
     return channel

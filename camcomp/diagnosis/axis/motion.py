@@ -53,8 +53,8 @@ def motion_of(
     """What moved while a channel had its values (n,): set-points, as late as they are followed, where that explains them as well.
 
     followed: positions (n,) of the axis by the fit of its following error, in place of set-points. The noise of an encoder is
-    in its following error, too, and would explain a part of itself. With the runs and their values, where somebody saw how fast the axis was, and where it no longer matters
-    how it moved before its log began.
+    in its following error, too, and would explain a part of itself. With the runs and their values, where somebody saw how fast the axis was, and,
+    in runs of `train`, where it no longer matters how it moved before its log began.
     """
     encoders = [travel(r.time, r.encoder, found.wide) for r in runs]
 
@@ -80,7 +80,7 @@ def motion_of(
     by_encoder = misfit(encoders) < ENCODER_BETTER * misfit(setpoints)
     if followed is not None and not by_encoder:
         setpoints = narrowest(followed, 0.0)
-    begun = [r.time >= r.time[0] + late * _fades(r.gap) for r in runs]
+    begun = [r.time >= r.time[0] + late * (_fades(r.gap) if k in train else 0.0) for k, r in enumerate(runs)]
     return kept(encoders if by_encoder else setpoints, begun)
 
 
