@@ -148,7 +148,7 @@ def _told(parts: Sequence[SampledColumns], log: str, theirs: str, notes: list[st
     """Columns with exactly this name, else in any case: at least one, at most one per part."""
     every = [(i, j, name) for i, part in enumerate(parts) for j, name in enumerate(part.names)]
     hits = [(i, j) for i, j, name in every if name == theirs] or [
-        (i, j) for i, j, name in every if _plain(name) == _plain(theirs)
+        (i, j) for i, j, name in every if name.lower() == theirs.lower() or _plain(name) == _plain(theirs)
     ]
     if not hits:
         names = {_plain(name): name for _, _, name in every}
