@@ -274,9 +274,8 @@ def test_verify_says_so_in_text_and_json(tmp_path):
 
 
 def test_long_programs_keep_lines_apart_where_they_begin_to_merge(orthoglide):
-    places = [(10.0 * np.sin(0.01 * k), 10.0 * np.cos(0.01 * k)) for k in range(400)]
-    cuts = [f"G1 X{x:.4f} Y{y:.4f} F3000" for x, y in places]
-    lines = ["G0 X0 Y10 Z5", "G1 Z0 F400", *cuts[:200], "G64 P0.01", *cuts[200:], "G1 Z5"]
+    begin, groove, end = (circle(1.0, 600)[:2], circle(1.0, 600)[2], circle(1.0, 600)[3])
+    lines = [*begin, groove, groove, "G64 P0.01", groove, groove, end]
     text = "\n".join([HEAD + "G61", "S8000 M3", *lines, "M2", ""]).encode()
     out = []
     LongProgram(job=orthoglide, name="p.nc", setup=setup_of(orthoglide.config), tolerance_um=1.0, version="1").run(

@@ -12,6 +12,8 @@ import pytest
 
 from tests.commandline import ROOT
 
+SAFE = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}  # Python 3.11.0 to 3.11.3 have none
+
 
 def call(*words, cwd, **environment):
     done = subprocess.run(
@@ -29,7 +31,7 @@ def built(tmp_path_factory):
     call(sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", out, cwd=ROOT)
     (sdist,) = out.glob("*.tar.gz")
     with tarfile.open(sdist) as archive:
-        archive.extractall(out / "source", filter="data")
+        archive.extractall(out / "source", **SAFE)
     (source,) = (out / "source").iterdir()
     call(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", out, cwd=source)
     (wheel,) = out.glob("*.whl")
@@ -96,7 +98,7 @@ def test_wheels_are_equal_byte_by_byte(built, tmp_path):
     """Built again later, elsewhere, by another user's umask, from a folder in which camcomp has run."""
     source = tmp_path / "source"
     with tarfile.open(built[1]) as archive:
-        archive.extractall(source, filter="data")
+        archive.extractall(source, **SAFE)
     (source,) = source.iterdir()
     (source / "camcomp/__pycache__").mkdir()
     (source / "camcomp/__pycache__/cli.cpython-311.pyc").write_bytes(b"left over")

@@ -9,7 +9,7 @@ import numpy as np
 
 from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import BASIC, follow, same_points
-from camcomp.compensation.long.proof import CHECKED_SHARE, MOST_CHECKED, judge
+from camcomp.compensation.long.proof import MOST_CHECKED, judge
 from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.compensation.program.compensate import Compensated, compensate
 from camcomp.compensation.program.result import Interpolation
@@ -150,15 +150,14 @@ class InterpolatedMachine:
                 value[rows] = getattr(own, each.name)
         return replace(state, **changed)
 
-    def proof(self, target: Floats, force: Floats, points: int) -> tuple[Interpolation | None, int]:
+    def proof(self, target: Floats, force: Floats) -> tuple[Interpolation | None, int]:
         """Differences of a sample of targets (n, 3) under forces (n, 3) to their exact solutions, and the most iterations.
 
-        points: of the program. None and 0: nothing was asked.
+        None and 0: nothing was asked.
         """
         if self._field is None:
             return None, 0
-        count = min(MOST_CHECKED, max(MOST_CHECKED // 10, int(CHECKED_SHARE * points)))
-        chosen = np.random.default_rng(len(target)).permutation(len(target))[:count]
+        chosen = np.random.default_rng(len(target)).permutation(len(target))[:MOST_CHECKED]
         p, f = target[chosen], force[chosen]
         aimed, free = self.solve(TARGET, p, f, None), self.solve(FREE, p, f, None)
         exact = correct(self.machine, p, f)
@@ -231,7 +230,7 @@ def compensate_whole(program: Program, job: Job, *, method: str, **settings: Any
     job = with_answers(job)
     found = compensate(program, job, method=method, **settings)
     at = job.frame.to_machine(found.rows.target), job.frame.vectors(found.rows.force)
-    interpolated, iterations = job.real_machine.answers.proof(*at, len(found.rows.target))
+    interpolated, iterations = job.real_machine.answers.proof(*at)
     return replace(found, interpolated=interpolated, iterations=max(found.iterations, iterations))
 
 

@@ -93,7 +93,7 @@ class LongProgram:
             self._told.result()
         totals = self.totals
         totals.finish(self._runs, [] if self._stock is None else self._stock.finish())
-        totals.interpolated, iterations = self._sample.proof(self._interpolated, totals.points)
+        totals.interpolated, iterations = self._sample.proof(self._interpolated)
         totals.iterations = max(totals.iterations, iterations)
         return totals
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from camcomp.compensation.program.totals import JointTableRows
     from camcomp.model.job import Job
 
-MOST_CHECKED, CHECKED_SHARE = 1000, 0.02  # points that are solved exactly, at most and of all
+MOST_CHECKED = 1000  # points that are solved exactly
 
 
 def judge(field: Field, gaps: tuple[Floats, ...], joints: Floats, drive: Floats, solved: int) -> Interpolation:
@@ -45,12 +45,9 @@ class Sample:
         target = job.frame.to_machine(rows.target[chosen])
         self._points.append(np.concatenate((target, rows.force[chosen]), axis=1))
 
-    def proof(self, job: Job, points: int) -> tuple[Interpolation | None, int]:
-        """Differences of rows to their exact solutions, and the most iterations.
-
-        job: with the machine that was interpolated. points: rows of the program.
-        """
+    def proof(self, job: Job) -> tuple[Interpolation | None, int]:
+        """Differences of rows to their exact solutions, and the most iterations. job: with the machine that was interpolated."""
         if not self._points:
             return None, 0
         target, force = np.split(np.concatenate(self._points), [3], axis=1)
-        return job.real_machine.answers.proof(target, force, points)  # type: ignore[no-any-return]
+        return job.real_machine.answers.proof(target, force)  # type: ignore[no-any-return]

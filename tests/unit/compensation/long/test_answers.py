@@ -59,7 +59,7 @@ def test_outputs_are_those_of_exact_solutions_within_a_tenth_of_a_micrometre(bot
 
 def test_the_summary_says_how_far_a_sample_is_from_exact_solutions(both):
     figures = both[1].summary.interpolation
-    assert figures is not None and 0.0 < figures.worst_um <= figures.bound_um and figures.checked == 100
+    assert figures is not None and 0.0 < figures.worst_um <= figures.bound_um and figures.checked > 500
     assert both[0].summary.interpolation is None and not both[1].failed
 
 
