@@ -48,6 +48,8 @@ def compensate_many(
     messages while the batch waits for a cluster. Raises errors of the whole batch; those of single programs are in its
     figures.
     """
+    if not scheduler and jobs != 1:
+        pools.start_early()
     config = load_config(configs)
     if config.control.dialect is None:
         list(usable("dialects"))  # warns about unusable plug-ins here, instead of once per worker

@@ -12,7 +12,7 @@ from camcomp.terminal.cli import VERBS
 
 COMMANDS = Path(camcomp.__file__).parent / "terminal" / "commands"
 BELOW = ("camcomp.api", "camcomp.ground", "camcomp.report", "camcomp.terminal")
-HEAVY = ("click", "joblib", "numba", "numpy", "pandas", "plotly", "pydantic", "pygcode", "ruamel", "scipy")
+HEAVY = ("click", "numba", "numpy", "pandas", "plotly", "pydantic", "pygcode", "ruamel", "scipy")
 
 
 def strangers(text):

@@ -8,24 +8,31 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import multiprocessing
 import os
+import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import CancelledError
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from itertools import islice
 from queue import Empty, Queue
+from types import ModuleType
 from typing import Any
 
 from camcomp import __version__
-from camcomp.compensation.batch.worker import BUG, Outcome, Task, live_with, work
+from camcomp.compensation.batch.worker import BUG, Outcome, Task, live_with_parent, work
 from camcomp.ground.errors import ConfigError, FileError
+from camcomp.ground.machine_code import ROOT
 from camcomp.ground.notes import note
 
 DEATHS = 3  # workers that a task may bring down before it is given up
 CONNECT = 10.0  # s within which a scheduler has to answer
 LOOK = 1.0  # s between two looks at a cluster in which nothing happens
 PATIENCE = 5.0  # s without a worker before a word is said about it
+FORKS = sys.platform != "win32"
+NEEDED = ("camcomp.compensation.batch.worker", "camcomp.compensation.long.program", "camcomp.model.from_program")
 
 
 def cores() -> int:
@@ -34,20 +41,33 @@ def cores() -> int:
 
 
 @contextmanager
-def safe_children() -> Iterator[None]:
-    """Child processes started within it import no module from the current folder.
+def clean_children() -> Iterator[None]:
+    """Child processes started within it have this camcomp, and neither modules of the current folder nor a main program.
 
-    Python puts that folder in front of its own modules for `python -m` and `python -c`, by which workers start.
+    Python puts that folder in front of its own modules for `python -c`, by which workers start.
     """
-    before = os.environ.get("PYTHONSAFEPATH")
+    before, main = os.environ.copy(), sys.modules["__main__"]
     os.environ["PYTHONSAFEPATH"] = "1"
+    if ROOT.name not in ("site-packages", "dist-packages"):  # where Python looks anyway
+        os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (str(ROOT), before.get("PYTHONPATH"))))
+    sys.modules["__main__"] = ModuleType("__main__")
     try:
         yield
     finally:
-        if before is None:
-            os.environ.pop("PYTHONSAFEPATH", None)
-        else:
-            os.environ["PYTHONSAFEPATH"] = before
+        sys.modules["__main__"] = main
+        for name in ("PYTHONSAFEPATH", "PYTHONPATH"):
+            os.environ.pop(name, None)
+            os.environ.update({name: before[name]} if name in before else {})
+
+
+def start_early() -> None:
+    """Start the process from which workers fork, with the modules that they need, while this process is busy."""
+    if FORKS:
+        from multiprocessing.forkserver import ensure_running
+
+        multiprocessing.set_forkserver_preload(list(NEEDED))
+        with clean_children():
+            ensure_running()
 
 
 def on_this_machine(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
@@ -55,50 +75,52 @@ def on_this_machine(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
     if jobs == 1:
         yield from map(work, tasks)
         return
-    with safe_children():
-        yield from _on_workers(tasks, jobs)
-
-
-def _on_workers(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
-    from joblib import Parallel, delayed
-    from joblib.externals.loky import get_reusable_executor
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
+    start_early()
     source = iter(tasks)
     open_tasks: dict[str, Task] = {}
-
-    def taken() -> Iterator[Any]:
-        for task in source:
-            open_tasks[task.key] = task
-            yield delayed(work)(task)
-
-    def run(calls: Iterable[Any], jobs: int) -> Iterator[Outcome]:
-        pool = Parallel(
-            n_jobs=jobs, backend="loky", return_as="generator_unordered", batch_size=1, pre_dispatch=2 * jobs,
-            initializer=live_with, initargs=(os.getpid(),),
-        )  # fmt: skip
-        for outcome in pool(calls):
-            open_tasks.pop(outcome.key)
-            for topic, text in outcome.notes.items():
-                note(topic, text)
-            yield outcome
-
     for _ in range(DEATHS):
-        try:
-            left = list(open_tasks.values())
-            yield from run([delayed(work)(task) for task in left], jobs)
-            yield from run(taken(), jobs)
-            get_reusable_executor().shutdown(wait=True, kill_workers=True)  # all tasks are done
+        with suppress(BrokenProcessPool):
+            yield from _on_workers(iter(list(open_tasks.values())), open_tasks, jobs)
+            yield from _on_workers(source, open_tasks, jobs)
             return
-        except TerminatedWorkerError:
-            continue
     for task in [*open_tasks.values(), *source]:  # one by one: now it shows which task brings workers down
-        open_tasks[task.key] = task
         try:
-            yield from run([delayed(work)(task)], 2)
-        except TerminatedWorkerError:
+            yield from _on_workers(iter([task]), open_tasks, 1)
+        except BrokenProcessPool:
             open_tasks.pop(task.key)
             yield died(task.key)
+
+
+def _on_workers(tasks: Iterator[Task], open_tasks: dict[str, Task], jobs: int) -> Iterator[Outcome]:
+    """Outcomes by one set of workers; open_tasks: those without an outcome. Raises BrokenProcessPool."""
+    pool = ProcessPoolExecutor(
+        jobs, multiprocessing.get_context("forkserver" if FORKS else "spawn"), initializer=live_with_parent
+    )
+    others, waiting = set(multiprocessing.active_children()), set[Future[Outcome]]()
+
+    def submit(count: int) -> None:
+        for task in islice(tasks, count):
+            open_tasks[task.key] = task
+            with clean_children():
+                waiting.add(pool.submit(work, task))
+
+    try:
+        submit(2 * jobs)
+        while waiting:
+            for each in wait(waiting, return_when=FIRST_COMPLETED).done:
+                waiting.remove(each)
+                outcome = each.result()
+                submit(1)
+                open_tasks.pop(outcome.key)
+                for topic, text in outcome.notes.items():
+                    note(topic, text)
+                yield outcome
+    except BaseException:
+        for process in set(multiprocessing.active_children()) - others:
+            process.kill()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def died(key: str) -> Outcome:

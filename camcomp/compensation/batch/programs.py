@@ -6,6 +6,7 @@ import glob
 import hashlib
 import json
 import os
+import pickle
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -139,7 +140,7 @@ def run_batch(
 
     What ends the pool (FileError, a signal) comes through, after the status of all that is known by then.
     """
-    config_key = plan.key_of_config()
+    config_key, config = plan.key_of_config(), pickle.dumps(plan.config)
     pending: dict[str, FoundProgram] = {}
     early: list[Status] = []
 
@@ -157,9 +158,8 @@ def run_batch(
                 continue
             pending[key] = each
             yield Task(
-                name=display_name(each.source), key=key, data=data, config=plan.config, config_key=config_key,
-                method=plan.method, tolerance_um=plan.tolerance_um, joints=plan.joints, stock=plan.stock,
-                passes=plan.passes,
+                name=display_name(each.source), key=key, data=data, config=config, method=plan.method,
+                tolerance_um=plan.tolerance_um, joints=plan.joints, stock=plan.stock, passes=plan.passes,
             )  # fmt: skip
 
     try:

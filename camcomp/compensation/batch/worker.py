@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import pickle
 import signal
 import threading
-import time
 import warnings
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
@@ -14,11 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 from camcomp import __version__
 from camcomp.ground.errors import CamcompError, FileError, PluginWarning, format_error
-from camcomp.ground.garbage import collect_seldom, keep_what_lives
+from camcomp.ground.garbage import collect_seldom
 from camcomp.ground.notes import held, hold
 from camcomp.ground.old_names import keep_old_names
 from camcomp.ground.progress import watched
-from camcomp.model.config.spec import Config
 
 if TYPE_CHECKING:
     from camcomp.compensation.program.totals import Totals
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 BUG = 70
 TABLE = "joints.csv"
-WATCH = 0.5  # s between two looks at the parent
 keep_old_names()  # tasks bring parameters of users' plug-ins, whose modules are imported before anything is asked of them
 
 
@@ -38,8 +37,7 @@ class Task:
     name: str  # for messages
     key: str  # hash of all that decides the result
     data: bytes
-    config: Config
-    config_key: str
+    config: bytes  # pickled once for all tasks
     method: str
     tolerance_um: float
     joints: bool
@@ -61,16 +59,17 @@ class Outcome:
     notes: dict[str, str] = field(default_factory=dict)  # by topic, for the user of the batch
 
 
-def live_with(parent: int) -> None:
+def live_with_parent() -> None:
     """For worker processes of this machine: interrupts are the parent's business, and its end, however it comes, theirs."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     hold()
-    threading.Thread(target=_end_without, args=(parent,), daemon=True).start()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-def _end_without(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(WATCH)
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
     os._exit(1)
 
 
@@ -116,17 +115,14 @@ def _compensate(task: Task) -> Outcome:
         if task.passes:
             return Outcome(key=task.key, exit_code=0, program=task.data)
         raise CheckFailed("CC603", f"{task.name} was compensated before")
-    config = task.config
-    job = job_of_program(_job(task.config_key, _Once(config)), task.data, task.name, task.stock)
+    shared = _job(task.config)
+    job = job_of_program(shared, task.data, task.name, task.stock)
     if (outcome := _in_pieces(task, job)) is not None:
-        _settle()
         return outcome
-    program = program_of(task.data, task.name, config)
+    program = program_of(task.data, task.name, shared.config)
     result = compensate(program, job, method=task.method, tolerance_um=task.tolerance_um, version=__version__)
     joints = joint_bytes(result, job, TABLE) if task.joints else None
-    outcome = _outcome(task, Totals.of(result, job), result.written.data, joints)
-    _settle()
-    return outcome
+    return _outcome(task, Totals.of(result, job), result.written.data, joints)
 
 
 def _in_pieces(task: Task, job: Job) -> Outcome | None:
@@ -154,30 +150,11 @@ def _outcome(task: Task, totals: Totals, program: bytes, joints: bytes | None) -
     )  # fmt: skip
 
 
-@lru_cache(maxsize=1)
-def _settle() -> None:
-    """Once: modules, machine and compiled code are there."""
-    keep_what_lives()
-
-
-class _Once:
-    """A config that does not take part in the comparison of cache keys: its hash does."""
-
-    def __init__(self, config: Config) -> None:
-        self.config = config
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Once)
-
-    def __hash__(self) -> int:
-        return 0
-
-
 @lru_cache(maxsize=2)
-def _job(_key: str, once: _Once) -> Job:
+def _job(config: bytes) -> Job:
     from camcomp.model.job import Job
 
-    return Job(once.config)
+    return Job(pickle.loads(config))
 
 
 def _message(error: CamcompError, text: str) -> dict[str, Any]:

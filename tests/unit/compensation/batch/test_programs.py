@@ -1,6 +1,7 @@
 """A batch: which programs there are, what is written where, what is skipped, what an error stops."""
 
 import json
+import pickle
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
 
@@ -257,8 +258,7 @@ def task(text, **more):
         name="p.nc",
         key="key",
         data=text.encode(),
-        config=load_config([MACHINE]),
-        config_key="config",
+        config=pickle.dumps(load_config([MACHINE])),
         method="newton",
         **given,
     )
