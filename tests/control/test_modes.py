@@ -254,6 +254,7 @@ def test_verify_repeats_what_the_control_makes_of_it(orthoglide, mode):
     assert told.cycle_time_s.before == pytest.approx(mine.cycle_time_s.before) and told.cycle_time_s.before > 3.0
     assert told.cycle_time_s.after == pytest.approx(mine.cycle_time_s.after, rel=1e-4)
     assert told.under_control.max_um == pytest.approx(mine.under_control.max_um, rel=0.1, abs=0.2)
+    assert told.under_control.rms_um == pytest.approx(mine.under_control.rms_um, rel=0.02)
     assert 1.0 > told.under_control.max_um > 0.5
 
 

@@ -18,7 +18,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.job import Job
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.solve import FREE, TARGET, State, inverse, solve
-from camcomp.model.statics.target import Correction, correct, settle
+from camcomp.model.statics.target import Correction, correct
 
 MOST_STEPS, STEP_MM = 20, 1e-5  # the slopes of a cube are those of its centre: every step leaves a tenth
 LEAST_MOTIONS = 2000  # from which new cubes pay
@@ -157,13 +157,15 @@ class InterpolatedMachine:
         """
         if self._field is None:
             return None, 0
-        chosen = np.random.default_rng(len(target)).permutation(len(target))[:MOST_CHECKED]
+        chosen = np.sort(
+            np.random.default_rng(len(target)).permutation(len(target))[:MOST_CHECKED]
+        )  # neighbours: fewer passes
         p, f = target[chosen], force[chosen]
-        aimed, free = self.solve(TARGET, p, f, None), self.solve(FREE, p, f, None)
-        exact = correct(self.machine, p, f)
-        tip, settled = settle(self.machine, p, f)
-        gaps, drive = (aimed.commanded - exact.commanded, free.tip - tip), free.drive - settled.drive
-        found = judge(self._field, gaps, aimed.rho - exact.rho, drive, 2 * len(p) + self._exact)
+        aimed, exact = self.solve(TARGET, p, f, None), correct(self.machine, p, f)
+        told = np.where(exact.status[:, None] == 0, exact.commanded, p)
+        free = self.solve(FREE, told, f, None)  # which has to lead back to the targets
+        gaps, drive = (aimed.commanded - exact.commanded, free.tip - p), free.drive - exact.drive
+        found = judge(self._field, gaps, aimed.rho - exact.rho, drive, len(p) + self._exact)
         return found, int(exact.iterations.max(initial=0))
 
 

@@ -103,7 +103,10 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     judged = (points.f > 0.0) & (original.path.kind[track.motion[points.piece]] != RAPID)
     judged &= ~load_turns(job, track).passed(points.piece, points.move, points.f, w)
     error = points.gap(w)[judged]
-    control = of_text(original, corrected, job, points.move[judged], told=points.commanded[judged], error=error)
+    seen = points.counted()[judged]
+    control = of_text(
+        original, corrected, job, points.move[judged][seen], told=points.commanded[judged][seen], error=error[seen]
+    )
     missed, totals = None, None
     if shares is not None:
         residual, missed = points.beside(w)
@@ -211,6 +214,12 @@ class _Points:
         told = path_geometry.points(path, move, f)
         return cls(asked=asked, path=path, piece=piece, move=move, f=f, commanded=told, rotation=rotation)
 
+    def counted(self) -> Bools:
+        """Points (k,) that a compensation looks at, too: ends and middles of moves, quarters of arcs that it changed."""
+        track, move = self.asked.track, self.move
+        changed = (self.path.end[move] != track.path.end[track.motion[self.piece]]).any(axis=1)
+        return np.asarray(self.f * np.where(changed & (self.path.kind[move] == ARC), 4, 2) % 1.0 == 0.0)
+
     def travel(self, w: Floats) -> Travel:
         """Travel at fractions w (k,) of the pieces, in the commanded orientation."""
         travel = travel_of(self.asked.job, self.asked.track, self.piece, w)
@@ -310,18 +319,21 @@ class _Points:
         # solver error: model tip of the exact command of the nearest point, minus that point
         tip, _ = respond(job, aim_at(job, target, travel, "newton").commanded, travel)
         convergence = sizes(tip - target)
-        line = program.path.line[track.motion[piece]]
+        numbers, at = np.unique(program.path.line[track.motion[piece]], return_inverse=True)
         rounding = 0.5 * np.sqrt(3.0) * 1e3 * program.step_mm(job.config.control.resolution_mm)
-        out = []
-        for number in np.unique(line):
-            on = line == number
-            at_ends, whole = float(residual[on & vertex].max()), float(residual[on].max())
-            out.append(
-                LineResult(
-                    line=int(number), moves=int((on & vertex).sum()), residual_um=1e3 * whole,
-                    convergence_um=1e3 * float(convergence[line[vertex] == number].max()), rounding_um=rounding,
-                    vertex_um=1e3 * at_ends, chord_um=1e3 * max(0.0, whole - at_ends),
-                    **({} if missed is None else {"missed_um": 1e3 * float(missed[on].max())}),
-                )
-            )  # fmt: skip
-        return out
+
+        def largest(values: Floats, rows: Ints) -> Floats:
+            out = np.zeros(len(numbers))
+            np.maximum.at(out, rows, values)
+            return out
+
+        moves = np.bincount(at[vertex], minlength=len(numbers))
+        whole, at_ends = largest(residual, at), largest(residual[vertex], at[vertex])
+        columns = np.column_stack((whole, largest(convergence, at[vertex]), at_ends, np.maximum(0.0, whole - at_ends)))
+        names = ["residual_um", "convergence_um", "vertex_um", "chord_um"]
+        if missed is not None:
+            columns, names = np.column_stack((columns, largest(missed, at))), [*names, "missed_um"]
+        return [
+            LineResult(line=line, moves=count, rounding_um=rounding, **dict(zip(names, row, strict=True)))
+            for line, count, row in zip(numbers.tolist(), moves.tolist(), (1e3 * columns).tolist(), strict=True)
+        ]
