@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.fit.measured import Measured, stack
-from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Bools, Floats, Path
 from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.loaded_structure import Slopes, Solved, rows_together
@@ -21,7 +20,6 @@ from camcomp.model.motion.twin import Reading, Twin
 from camcomp.model.statics.arm import ARM_LENGTH
 
 _SHARE_OF_SCALE = 0.05  # step of a difference
-_FEW_COLUMNS = 32  # up to which adding row to row is faster than numpy's mean
 _KEPT = 12  # changed machines whose structures are kept per run
 
 
@@ -258,35 +256,14 @@ def thinned(values: Floats, factor: int) -> Floats:
     if factor == 1:
         return values
     n = len(values) // factor
-    blocks = values[: n * factor].reshape(n, factor, -1)
-    if blocks.shape[2] > _FEW_COLUMNS:
-        return np.asarray(blocks.mean(axis=1))
-    out: Floats = blocks[:, 0].copy()
-    for i in range(1, factor):
-        out += blocks[:, i]
-    return out / factor
+    return np.asarray(np.einsum("nfc->nc", values[: n * factor].reshape(n, factor, -1)) / factor)
 
 
 def means(values: Floats, ways: Floats, factor: int) -> Floats:
     """Means (c, n // factor, f) of functions (n, f) times ways (c, n) over `factor` rows each."""
-    columns = np.ascontiguousarray(values.T)
-    out = np.empty((len(ways), len(columns), len(values) // factor))
-    _means(columns, ways, factor, out)
-    return out.transpose(0, 2, 1)
-
-
-@kept
-def _means(columns, ways, factor, out):  # type: ignore[no-untyped-def]  # pragma: no cover
-    channels, functions, n = out.shape
-    for j in range(functions):
-        for c in range(channels):
-            column, way, to, at = columns[j], ways[c], out[c, j], 0
-            for t in range(n):
-                total = 0.0
-                for i in range(factor):
-                    total += column[at + i] * way[at + i]
-                to[t] = total / factor
-                at += factor
+    n = len(values) // factor
+    functions, each = values[: n * factor].reshape(n, factor, -1), ways[:, : n * factor].reshape(-1, n, factor)
+    return np.asarray(np.einsum("nif,cni->cnf", functions, each) / factor)
 
 
 def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cause:

@@ -359,6 +359,6 @@ def _middle_rows(run: Run) -> np.ndarray:
     return np.arange(n) * run.thin + run.thin // 2
 
 
-def patterns(bench: Bench) -> list[Dictionary]:
-    """Generic patterns for all runs, by kind of channel."""
+def patterns(bench: Bench) -> Dictionary:
+    """Generic patterns for all runs."""
     return dictionary(grounds(bench), bench.actuators)

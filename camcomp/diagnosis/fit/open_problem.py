@@ -50,10 +50,10 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     }
     problem = _whitened(
         Problem(
-            bench=bench, columns=columns, dictionaries=[], inflate=inflate, times=times, residuals=residuals,
+            bench=bench, columns=columns, dictionary=Dictionary((), (), ()), inflate=inflate, times=times, residuals=residuals,
             floor=floor, noise=noise, outliers=outliers, white=[], white_patterns=[], white_residual=[],
             shapes=shapes, candidates=cause_prior(columns),
-        ), []
+        )
     )  # fmt: skip
     if len(columns.of_labels):
         mean = estimate(total(problem.base_grams), problem.prior, ())[0]
@@ -83,15 +83,15 @@ def _with_model_error(problem: Problem) -> Noise:
     return replace(problem.noise, sigma=sigma)
 
 
-def _whitened(problem: Problem, words: Sequence[Dictionary]) -> Problem:
+def _whitened(problem: Problem, words: Dictionary | None = None) -> Problem:
     """The problem with its columns, patterns and residuals white under its noise."""
     every = [(k, own, t) for k, (own, t) in enumerate(zip(problem.inflate, problem.times, strict=True))]
     noise, residuals = problem.noise, problem.residuals
     return replace(
         problem,
-        dictionaries=[replace(each, blocks=()) for each in words],  # white they are enough
+        dictionary=problem.dictionary if words is None else replace(words, blocks=()),  # white they are enough
         white=[noise.by_channel(k, problem.columns.blocks[k], own, t) for k, own, t in every],
-        white_patterns=[[noise.by_channel(k, w.blocks[k], own, t, w.first) for w in words] for k, own, t in every],
+        white_patterns=[noise.by_channel(k, words.blocks[k], own, t) for k, own, t in every] if words else [],
         white_residual=[noise.rows(k, residuals[k][:, :, None], own, t)[:, 0] for k, own, t in every],
     )
 

@@ -39,11 +39,10 @@ class Ground:
 
 @dataclass(frozen=True, eq=False)
 class Dictionary:
-    """Functions of one kind of channel. labels (p,): covariate; blocks: per run (c n, p), c channels from `first` on."""
+    """labels (p,): covariate; kinds (p,): of the channel that a function moves; blocks: per run (c n, p)."""
 
-    kind: str
-    first: int
     labels: tuple[str, ...]
+    kinds: tuple[str, ...]
     blocks: tuple[ByChannel, ...]
 
 
@@ -106,62 +105,48 @@ def _of_direction(g: Ground) -> list[Floats]:
     return [np.where(moving, f(k * angle), 0.0) for k in (1, 2) for f in (np.cos, np.sin)]
 
 
-class _Store:
-    """Collects functions of one kind in its unit, um or N; those that are zero in every run are dropped."""
-
-    def __init__(self, kind: str, first: int, width: int, rows: Sequence[int]) -> None:
-        self.kind, self.first, self.width, self.rows = kind, first, width, rows
-        self.size = 1e-3 if kind in ("tip", "encoder") else 1.0
-        self.labels: list[str] = []
-        self.channels: list[int] = []
-        self.columns: list[list[Floats]] = [[] for _ in rows]
-
-    def put(self, label: str, channels: Iterable[int], functions: Functions) -> None:
-        """Add every function, of every run, to each of the channels; of runs without any it is 0."""
-        count = max(map(len, functions))
-        full = [own or [np.zeros(n)] * count for own, n in zip(functions, self.rows, strict=True)]
-        each = [
-            per_run for per_run in zip(*full, strict=True) if any(np.abs(v).max(initial=0.0) >= 1e-12 for v in per_run)
-        ]
-        for per_run, channel in product(each, channels):
-            self.labels.append(label)
-            self.channels.append(channel)
-            for store, values in zip(self.columns, per_run, strict=True):
-                store.append(self.size * values)
-
-    def done(self) -> Dictionary:
-        return Dictionary(self.kind, self.first, tuple(self.labels), tuple(map(self._block, self.columns)))
-
-    def _block(self, columns: Sequence[Floats]) -> ByChannel:
-        every = np.array(self.channels, int)
-        each = np.stack(columns, axis=1) if columns else np.zeros((0, 0))
-        mine = [np.flatnonzero(every == channel) for channel in range(self.width)]
-        return ByChannel(len(every), tuple((on, each[:, on]) for on in mine))
-
-
-def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dictionary]:
-    """All functions of the channels that were measured; unit size is 1 um or 1 N."""
+def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> Dictionary:
+    """All functions of the channels that were measured, without those that are zero in every run; unit size is 1 um or 1 N."""
     m, rows = len(actuators), [len(g.tip) for g in grounds]
-    every = zip(KINDS, (0, 3, 3 + m, 3 + 2 * m), (3, m, m, 3), strict=True)
-    stores = {
-        kind: _Store(kind, first, width, rows) for kind, first, width in every if any(g.present[kind] for g in grounds)
-    }
+    first = dict(zip(KINDS, (0, 3, 3 + m, 3 + 2 * m), strict=True))
+    kinds = [kind for kind in KINDS if any(g.present[kind] for g in grounds)]
+    found: list[tuple[str, str, int, tuple[Floats, ...]]] = []
+
+    def put(kind: str, label: str, channels: Iterable[int], functions: Functions) -> None:
+        """Add every function, of every run, to each of the channels of a kind; of runs without any it is 0."""
+        count = max(map(len, functions))
+        full = [own or [np.zeros(n)] * count for own, n in zip(functions, rows, strict=True)]
+        each = [run for run in zip(*full, strict=True) if any(np.abs(v).max(initial=0.0) >= 1e-12 for v in run)]
+        found.extend((kind, label, first[kind] + channel, run) for run, channel in product(each, channels))
+
     for j, a in enumerate(actuators):
         for name, functions in _of_actuator(grounds, j).items():
-            for kind in stores.keys() - {"dyno", "encoder" if name == "force" else ""}:
-                # a displaced carriage moves the tip in any direction
-                stores[kind].put(f"{name}:{a}", range(3) if kind == "tip" else (j,), functions)
+            for kind in kinds:
+                if kind != "dyno" and (kind, name) != ("encoder", "force"):
+                    # a displaced carriage moves the tip in any direction
+                    put(kind, f"{name}:{a}", range(3) if kind == "tip" else (j,), functions)
     for name, functions in _of_time(grounds).items():
-        for kind, store in stores.items():
+        for kind in kinds:
             for channel, of in enumerate("xyz" if kind in ("tip", "dyno") else actuators):
-                store.put(f"{name}:{of}", (channel,), functions)
+                put(kind, f"{name}:{of}", (channel,), functions)
     turns = [_of_direction(g) for g in grounds]
     for axis, name in enumerate("xyz"):
         loads = _smooth([g.force[:, axis] for g in grounds])
-        for kind in stores.keys() & {"tip", "dyno"}:
-            stores[kind].put(f"direction:{name}", (axis,), turns)
-            stores[kind].put(f"force:{name}", range(3) if kind == "tip" else (axis,), loads)
-        if "tip" in stores:
-            places = _smooth([g.tip[:, axis] for g in grounds], _FINER, REPEATABILITY_MM)
-            stores["tip"].put(f"position:{name}", range(3), places)
-    return [store.done() for store in stores.values()]
+        for kind in [each for each in kinds if each in ("tip", "dyno")]:
+            put(kind, f"direction:{name}", (axis,), turns)
+            put(kind, f"force:{name}", range(3) if kind == "tip" else (axis,), loads)
+        if "tip" in kinds:
+            put(
+                "tip",
+                f"position:{name}",
+                range(3),
+                _smooth([g.tip[:, axis] for g in grounds], _FINER, REPEATABILITY_MM),
+            )
+    on = np.array([channel for *_, channel, _ in found], int)
+    mine = [np.flatnonzero(on == channel) for channel in range(6 + 2 * m)]
+    size = np.where((on < 3 + m), 1e-3, 1.0)
+    blocks = []
+    for run, n in enumerate(rows):
+        each = np.stack([values[run] for *_, values in found], axis=1) * size if found else np.zeros((n, 0))
+        blocks.append(ByChannel(len(found), tuple((own, each[:, own]) for own in mine)))
+    return Dictionary(tuple(label for _, label, *_ in found), tuple(kind for kind, *_ in found), tuple(blocks))

@@ -18,7 +18,7 @@ from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members,
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.errors import PhysicsError
 from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.twin import Reading
@@ -38,7 +38,7 @@ class Problem:
 
     bench: Bench
     columns: Columns
-    dictionaries: list[Dictionary]
+    dictionary: Dictionary
     inflate: list[Floats]
     times: list[Floats]
     residuals: list[Floats]
@@ -46,7 +46,7 @@ class Problem:
     noise: Noise
     outliers: list[Bools]  # per run (n, c), before thinning
     white: list[ByChannel]  # per run (w, k)
-    white_patterns: list[list[ByChannel]]  # per run, per kind (rows of the kind, p)
+    white_patterns: list[ByChannel]  # per run (w, p)
     white_residual: list[Floats]
     shapes: dict[int, dict[str, float]]
     candidates: CausePrior
@@ -83,6 +83,10 @@ class Problem:
         m = len(self.bench.actuators)
         first = dict(zip(KINDS, (0, 3, 3 + m, 3 + 2 * m, 6 + 2 * m), strict=False))[kind]
         return slice(first, first + (3 if kind in ("tip", "dyno") else m))
+
+    def kind_of(self, channel: int) -> str:
+        """The kind (patterns.KINDS) of a channel."""
+        return next(kind for kind in KINDS if channel < self.channels_of(kind).stop)
 
     @property
     def prior(self) -> Prior:
@@ -377,11 +381,15 @@ class Problem:
         """Whether a candidate acts for a while only, so that other runs do not determine it."""
         return any(p.placed for p in self.columns.candidates[i].shapes)
 
+    def row_cells(self, k: int) -> tuple[Ints, Ints]:
+        """Channel and row (w,) of every white row of run k."""
+        channel, row = np.nonzero((np.isfinite(self.inflate[k]) & np.isfinite(self.noise.sigma[k])).T)
+        return channel, row
+
     def row_places(self, k: int) -> Floats:
         """Where in the time of run k each white row (w,) lies, 0 to 1."""
         t = self.times[k]
-        at = (t - t[0]) / max(float(t[-1] - t[0]), 1e-12)
-        return self.noise.rows_of(k, at, self.inflate[k])
+        return np.asarray((t - t[0]) / max(float(t[-1] - t[0]), 1e-12))[self.row_cells(k)[1]]
 
     def _move_shapes(
         self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]], left: Sequence[Floats],

@@ -21,6 +21,7 @@ from math import log
 import numpy as np
 from scipy.special import logsumexp
 
+from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.discrepancy import UNKNOWN, gains_at_scales
 from camcomp.diagnosis.model.noise import MINOR
@@ -132,17 +133,14 @@ def _is_alike(joint: JointProducts, g: Ints, amount: Floats, columns: Members, t
     return apart < MODELLED**2 * own
 
 
-def _weights(problem: Problem) -> list[list[float]]:
-    """Weight of a white row per run and kind of channel: none counts for more than MINOR floors at the tip.
+def _weights(problem: Problem) -> list[Floats]:
+    """Weights (w,) of the white rows per run: none counts for more than MINOR floors at the tip.
 
     An encoder resolves a hundredth of it, and every model is wrong by more.
     """
     noise_um, most = 1e3 * problem.noise.sigma * problem.bench.tip_sizes, MINOR * problem.floor.tip_um
-    kinds = [problem.channels_of(words.kind) for words in problem.dictionaries]
-    return [[min(1.0, _middle(own[kind]) / most) for kind in kinds] for own in noise_um]
-
-
-def _middle(values: Floats) -> float:
-    """Median of the values (n,) above 0; infinite without any."""
-    seen = values[values > 0.0]
-    return float(np.median(seen)) if len(seen) else np.inf
+    for kind in KINDS:
+        part = problem.channels_of(kind)
+        for own in noise_um:
+            own[part] = np.median(own[part][own[part] > 0.0]) if (own[part] > 0.0).any() else np.inf
+    return [np.minimum(own / most, 1.0)[problem.row_cells(k)[0]] for k, own in enumerate(noise_um)]

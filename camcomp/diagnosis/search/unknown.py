@@ -29,39 +29,33 @@ def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, Resid
     return score_test(joint, *joint.projected(prior, problem.member_columns(f.members)))
 
 
-def joint_products(problem: Problem, f: Fitted, weight: Sequence[Sequence[float]] | None = None) -> JointProducts:
-    """Products of columns, residual and functions of covariates about a fit; weight: of a row, per run and kind."""
+def joint_products(problem: Problem, f: Fitted, weight: Sequence[Floats] | None = None) -> JointProducts:
+    """Products of columns, residual and functions of covariates about a fit; weight: of the rows (w,), per run."""
     white, residual = about(problem, f)
-    labels = [words.labels for words in problem.dictionaries]
-    kinds = [words.kind for words in problem.dictionaries]
     return JointProducts.of(
-        white=white, residual=residual, blocks=problem.white_patterns, labels=labels, kinds=kinds, weight=weight
-    )
+        white, residual, patterns=problem.white_patterns, labels=problem.dictionary.labels, kinds=problem.dictionary.kinds,
+        weight=[np.ones(len(r)) for r in residual] if weight is None else weight,
+    )  # fmt: skip
 
 
-def process_in_time(
-    problem: Problem, f: Fitted, weight: Sequence[Sequence[float]], power: float
-) -> list[tuple[Gram, float]]:
+def process_in_time(problem: Problem, f: Fitted, weight: Sequence[Floats], power: float) -> list[tuple[Gram, float]]:
     """Normal equations about a fit with a process over the time of every run in the first kind of channel, and the log of its
     size, at every scale of model/discrepancy.
 
-    weight: of a row, per run and kind. power: of the distance in the logarithm of the correlation, 2 of a smooth process, 1 of one
+    weight: of the rows (w,), per run. power: of the distance in the logarithm of the correlation, 2 of a smooth process, 1 of one
     with jumps from row to row.
     """
-    k, scales, rows = len(problem.columns.names), len(LENGTHS["time"]) * len(SCALES), 0.0
+    k, scales = len(problem.columns.names), len(LENGTHS["time"]) * len(SCALES)
     A, log_size = np.zeros((scales, k + 1, k + 1)), np.zeros(scales)
     for run, (W, r) in enumerate(zip(*about(problem, f), strict=True)):
-        joint, at = W.appended(r[:, None]), problem.row_places(run)
-        ends = np.cumsum([len(part) for part in problem.white_patterns[run]]).tolist()
-        for first, last, size in zip([0, *ends], ends, weight[run], strict=False):
-            own = joint[first:last]
-            rows += size**2 * len(own)
-            if first:
-                A += size**2 * (own.T @ own)
-            else:
-                _add_process(A, log_size, [(on, size * X) for on, X in own.parts if len(X)], at, power)
+        own, channels = W.appended(r[:, None]).scaled(weight[run]), np.unique(problem.row_cells(run)[0])
+        first = sum(problem.kind_of(c) == problem.kind_of(channels[0]) for c in channels)
+        _add_process(A, log_size, own.parts[:first], problem.row_places(run), power)
+        rest = ByChannel(k + 1, own.parts[first:])
+        A += rest.T @ rest
+    rows = round(sum(float((w**2).sum()) for w in weight))
     return [
-        (Gram(each[:k, :k], each[:k, k], float(each[k, k]), round(rows)), float(log))
+        (Gram(each[:k, :k], each[:k, k], float(each[k, k]), rows), float(log))
         for each, log in zip(A, log_size, strict=True)
     ]
 

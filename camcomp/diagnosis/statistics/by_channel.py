@@ -107,6 +107,11 @@ class ByChannel:
         new = np.arange(self.width, self.width + columns.shape[1])
         return ByChannel(self.width + len(new), self.parts).exchanged(new, columns)
 
+    def scaled(self, factor: Floats) -> ByChannel:
+        """With every row times a factor (w,)."""
+        each = zip(self.parts, self._starts, strict=False)
+        return ByChannel(self.width, tuple((on, factor[at : at + len(X), None] * X) for (on, X), at in each))
+
     def dense(self, rows: slice = slice(None)) -> Floats:
         """Every value (n, c, k) of channels that have n rows each, or of some of these rows."""
         parts = [(on, X[rows]) for on, X in self.parts]

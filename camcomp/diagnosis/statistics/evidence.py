@@ -25,7 +25,6 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import log_ndtr, logsumexp
 
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Floats, Ints
 
 PRIOR_WIDTHS = np.array([0.02, 0.1, 0.5, 2.5])
@@ -133,7 +132,12 @@ def _log_bayes(at: Base, prior: Prior, index: Ints, cause: Ints) -> Floats:
     sizes, weight = _widths(int(cause[-1]) + 1)
     wide = 1.0 / (prior.scale[index][:, None] * sizes[:, cause]) ** 2  # (s, w, d)
     wide = np.minimum(wide, narrow[:, None])  # a cause is at least as wide as its tolerance
-    posterior, spread, fit, log_det = _posteriors(inverse - narrow[:, :, None] * np.eye(len(cause)), h, wide)
+    precision = inverse[:, None] + (wide - narrow[:, None])[..., None] * np.eye(len(cause))
+    covariance, (sign, log_det) = np.linalg.inv(precision), np.linalg.slogdet(precision)
+    variance = np.diagonal(covariance, axis1=2, axis2=3)
+    proper = (sign > 0.0) & (variance > 0.0).all(axis=2)
+    posterior, spread = (covariance @ h[:, None, :, None])[..., 0], np.sqrt(np.maximum(variance, 1e-300))
+    fit = np.where(proper, np.sum(h[:, None] * posterior, axis=2), -np.inf)
     none = np.log(narrow).sum(axis=1) - np.linalg.slogdet(inverse)[1] + np.sum(mean * h, axis=1)
     value = 0.5 * (fit + np.log(wide).sum(axis=2) - log_det - none[:, None]) + weight
     signed = prior.sign[index][:, None] > 0
@@ -150,44 +154,6 @@ def _widths(count: int) -> tuple[Floats, Floats]:
 @cache
 def _choices(count: int, widths: int) -> Ints:
     return np.array(list(product(range(widths), repeat=count)))
-
-
-@kept
-def _posteriors(likelihood, h, wide):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Per set (s) and prior precision wide (s, w, d): mean and deviation (s, w, d), h's mean and log determinant (s, w) of the
-    precision. The inverse by Gauss and Jordan; the determinant is infinite where the precision is none.
-    """
-    sets, n, d = wide.shape
-    mean, spread = np.zeros((sets, n, d)), np.ones((sets, n, d))
-    fit, log_det = np.zeros((sets, n)), np.zeros((sets, n))
-    A = np.zeros((d, d))
-    for b in range(sets):
-        for w in range(n):
-            A[:] = likelihood[b]
-            for i in range(d):
-                A[i, i] += wide[b, w, i]
-            for k in range(d):
-                pivot = A[k, k]
-                if not pivot > 0.0:
-                    log_det[b, w] = np.inf
-                    break
-                log_det[b, w] += np.log(pivot)
-                A[k, k] = 1.0
-                for j in range(d):
-                    A[k, j] /= pivot
-                for i in range(d):
-                    if i != k:
-                        factor = A[i, k]
-                        A[i, k] = 0.0
-                        for j in range(d):
-                            A[i, j] -= factor * A[k, j]
-            if log_det[b, w] < np.inf:
-                for i in range(d):
-                    spread[b, w, i] = np.sqrt(max(A[i, i], 1e-300))
-                    for j in range(d):
-                        mean[b, w, i] += A[i, j] * h[b, j]
-                    fit[b, w] += h[b, i] * mean[b, w, i]
-    return mean, spread, fit, log_det
 
 
 def estimate(data: Gram, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:

@@ -39,16 +39,8 @@ class Noise:
 
         inflate (n, all channels) >= 1: by how much a row is less certain than its channel. time (n,) s.
         """
-        known = self._known(run, inflate, time)
-        parts = [(j, known[j]) for j in range(first, first + values.shape[1]) if j in known]
-        out = np.empty((sum(len(each.rows) for _, each in parts), values.shape[2]))
-        at = 0
-        for j, each in parts:
-            white = out[at : at + len(each.rows)]
-            x = values[:, j - first]
-            _innovations(x, each.rows, each.scale, each.fresh, self.slow[run, j], self.memory[run, j], white)
-            at += len(each.rows)
-        return out
+        channels = ByChannel.of(values[:, j] for j in range(values.shape[1]))
+        return np.asarray(self.by_channel(run, channels, inflate, time, first)[:, np.arange(values.shape[2])])
 
     def by_channel(self, run: int, values: ByChannel, inflate: Floats, time: Floats, first: int = 0) -> ByChannel:
         """The same of values whose channels, n rows each, lie one behind the other."""
@@ -72,15 +64,6 @@ class Noise:
                     found[j] = _Channel(np.flatnonzero(present), scale, starts(time, present))
             kept = self._laid[run] = (inflate, time, found)
         return kept[2]
-
-    def rows_of(self, run: int, value: Floats, inflate: Floats) -> Floats:
-        """Value (n,) of every white row (w,) of all channels, in the order of `rows`."""
-        out = [
-            value[np.isfinite(inflate[:, j])]
-            for j in range(inflate.shape[1])
-            if np.isfinite(inflate[:, j]).any() and np.isfinite(self.sigma[run, j])
-        ]
-        return np.concatenate(out) if out else np.zeros(0)
 
 
 @kept

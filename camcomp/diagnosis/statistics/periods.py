@@ -18,7 +18,6 @@ _TREND = 4  # terms of the polynomial that is taken out with the sines, and half
 _PER_PERIOD = 2.0  # rows that a period needs, by the sampling theorem
 _STANDS_OUT = 0.2  # share of what the trend leaves
 _AT_ONCE = 1_000_000  # values held in memory
-_AGREE = 0.6  # by how much both directions may differ, in units of their sum
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,88 +59,69 @@ def _spectrum(y: Floats, x: Floats, frequencies: Floats, trend: Floats) -> tuple
     return np.concatenate(found), float(rest @ rest)
 
 
-def _log_chance(explained: Floats, energy: float, rows: float) -> Floats:
-    """Log of the chance that noise of `rows` independent rows leaves so little unexplained, per frequency."""
-    left = np.clip(1.0 - explained / max(energy, 1e-300), 1e-12, 1.0)
-    return 0.5 * max(rows - 2.0, 0.0) * np.log(left)
-
-
 def screws(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLine]:
     """Lines at one period of an actuator's own travel, the gap read as motion of its carriage."""
-    found = []
+    found, whole = [], sum(float((r.drives**2).sum()) for r in runs)
     for j, name in enumerate(names):
-        y = np.concatenate([r.drives[:, j] for r in runs])
-        x = np.concatenate([r.position[:, j] for r in runs])
-        sign = np.concatenate([np.sign(r.direction[:, j]) for r in runs])
+        y, x, way = (np.concatenate([getattr(r, of)[:, j] for r in runs]) for of in ("drives", "position", "direction"))
+        sign = np.sign(way)
         steps = np.concatenate([np.abs(np.diff(r.position[:, j])) for r in runs if len(r.time) > 1] or [np.zeros(1)])
         span, step = float(np.ptp(x)), float(np.quantile(steps, 0.9))
         if span <= 0.0 or step <= 0.0 or len(y) < 30:
             continue
-        thin = float(np.mean([r.thin for r in runs]))
-        frequencies = np.arange(0.5 * _TREND / span, min(1.0 / (_PER_PERIOD * step), 2.0), 0.25 / span)
-        if len(frequencies) == 0:
+        tried = np.arange(0.5 * _TREND / span, min(1.0 / (_PER_PERIOD * step), 2.0), 0.25 / span)
+        trend = _trend(x, sign)
+        part = y, x, float(np.mean([r.thin for r in runs])), trend
+        if (line := _line([part], tried, len(names))) is None:
             continue
-        explained, energy = _spectrum(y, x, frequencies, _trend(x, sign))
-        best = int(np.argmax(explained))
-        log_chance = _log_chance(explained, energy, len(y) / thin)[best] + np.log(len(frequencies) * len(names))
-        if log_chance > np.log(_CHANCE) or explained[best] < _STANDS_OUT * energy:
-            continue
-        f = _finer(y, x, frequencies, best, _trend(x, sign))
+        f, energy = line
+        near = f + 0.25 / span * np.linspace(-1.0, 1.0, 21)
+        f = float(near[int(np.argmax(_spectrum(y, x, near, trend)[0]))])
         ways = [_wave(y[sign * s > 0], x[sign * s > 0], f) for s in (1.0, -1.0) if (sign * s > 0).sum() > 15]
-        if len(ways) < 2 or abs(ways[0] - ways[1]) > _AGREE * (abs(ways[0]) + abs(ways[1])):
-            continue
-        found.append(
-            SpectralLine(name, 1.0 / f, abs(sum(ways)) / 2.0, float(explained[best]) / max(_whole(runs), 1e-300))
-        )
+        if len(ways) == 2 and abs(ways[0] - ways[1]) <= 0.5 * (abs(ways[0]) + abs(ways[1])):
+            found.append(SpectralLine(name, 1.0 / f, abs(sum(ways)) / 2.0, energy / max(whole, 1e-300)))
     return sorted(found, key=lambda line: -line.share)
 
 
 def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLine]:
     """Lines at one frequency in time, in the channels of the gap; phases differ from run to run."""
-    found = []
+    found, whole = [], sum(float(np.nansum(r.gap**2)) for r in runs)
     for j, name in enumerate(names):
-        parts = []
-        for r in runs:
-            known = np.isfinite(r.gap[:, j])
-            if known.sum() > 30:
-                parts.append((r.gap[known, j], r.time[known], r.thin))
+        known = [(r, np.isfinite(r.gap[:, j])) for r in runs]
+        parts = [(r.gap[on, j], r.time[on], r.thin, _trend(r.time[on], None)) for r, on in known if on.sum() > 30]
         if not parts:
             continue
-        shortest = min(float(np.ptp(t)) for _, t, _ in parts)
-        step = max(float(np.median(np.diff(t))) for _, t, _ in parts)
-        tried = np.arange(
-            0.5 * _TREND / shortest, 1.0 / (_PER_PERIOD * step), 0.25 / max(float(np.ptp(t)) for _, t, _ in parts)
-        )
-        if len(tried) == 0:
-            continue
-        logs, shares, energies = np.zeros(len(tried)), [], np.zeros(len(tried))
-        for y, t, thin in parts:
-            explained, energy = _spectrum(y, t, tried, _trend(t, None))
-            logs += _log_chance(explained, energy, len(y) / thin)
-            shares.append(explained / max(energy, 1e-300))
-            energies += explained
-        common = np.median(shares, axis=0)
-        best = int(np.argmax(common))
-        if common[best] < _STANDS_OUT or logs[best] + np.log(len(tried) * len(names)) > np.log(_CHANCE):
-            continue
-        f = float(tried[best])
-        size = np.mean([abs(_wave(y, t, f)) for y, t, _ in parts])
-        found.append(
-            SpectralLine(
-                name, f, float(size), float(energies[best]) / max(sum(float(np.nansum(r.gap**2)) for r in runs), 1e-300)
-            )
-        )
+        spans = [float(np.ptp(t)) for _, t, *_ in parts]
+        step = max(float(np.median(np.diff(t))) for _, t, *_ in parts)
+        tried = np.arange(0.5 * _TREND / min(spans), 1.0 / (_PER_PERIOD * step), 0.25 / max(spans))
+        if (line := _line(parts, tried, len(names))) is not None:
+            size = np.mean([abs(_wave(y, t, line[0])) for y, t, *_ in parts])
+            found.append(SpectralLine(name, line[0], float(size), line[1] / max(whole, 1e-300)))
     return sorted(found, key=lambda line: -line.share)
 
 
-def _whole(runs: Sequence[RunGap]) -> float:
-    return sum(float((r.drives**2).sum()) for r in runs)
+def _line(
+    parts: Sequence[tuple[Floats, Floats, float, Floats]], tried: Floats, names: int
+) -> tuple[float, float] | None:
+    """The best of the frequencies tried (f,), and the energy of its sines, if chance and trends do not make it.
 
-
-def _finer(y: Floats, x: Floats, tried: Floats, best: int, trend: Floats) -> float:
-    step = tried[1] - tried[0] if len(tried) > 1 else 0.05 * tried[0]
-    near = tried[best] + step * np.linspace(-1.0, 1.0, 21)
-    return float(near[int(np.argmax(_spectrum(y, x, near, trend)[0]))])
+    parts: per series values (n,), places (n,), rows per independent one, trend (n, k). names: number of actuators or axes.
+    """
+    if not len(tried):
+        return None
+    logs, energies, shares = np.zeros(len(tried)), np.zeros(len(tried)), list[Floats]()
+    for y, x, thin, trend in parts:
+        explained, energy = _spectrum(y, x, tried, trend)
+        left = np.clip(1.0 - explained / max(energy, 1e-300), 1e-12, 1.0)
+        logs += 0.5 * max(len(y) / thin - 2.0, 0.0) * np.log(left)  # chance that noise leaves so little unexplained
+        shares.append(explained / max(energy, 1e-300))
+        energies += explained
+    common = np.median(shares, axis=0)
+    best = int(np.argmax(common))
+    chance = logs[best] + np.log(len(tried) * names)
+    return (
+        None if common[best] < _STANDS_OUT or chance > np.log(_CHANCE) else (float(tried[best]), float(energies[best]))
+    )
 
 
 def _wave(y: Floats, x: Floats, f: float) -> complex:

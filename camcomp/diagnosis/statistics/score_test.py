@@ -45,35 +45,18 @@ class JointProducts:
 
     @staticmethod
     def of(
-        *,
-        white: Sequence[ByChannel],
-        residual: Sequence[Floats],
-        blocks: Sequence[Sequence[ByChannel]],
-        labels: Sequence[Sequence[str]],
-        kinds: Sequence[str],
-        weight: Sequence[Sequence[float]] | None = None,
-    ) -> JointProducts:
-        """Sum over runs of white columns (w, k) and residuals (w,).
-
-        blocks: white patterns per run and kind, whose rows follow each other in `white`. labels: covariates of the patterns
-        per kind. weight: of a row, per run and kind.
-        """
-        k, p = white[0].width, sum(map(len, labels))
-        A, B, P, rows = np.zeros((k + 1, k + 1)), np.zeros((k + 1, p)), np.zeros((p, p)), 0.0
-        for run, (W, r, parts) in enumerate(zip(white, residual, blocks, strict=True)):
-            joint, row, at = W.appended(r[:, None]), 0, 0
-            for kind, (part, names) in enumerate(zip(parts, labels, strict=True)):
-                square = 1.0 if weight is None else weight[run][kind] ** 2
-                own, to = joint[row : row + len(part)], slice(at, at + len(names))
-                A += square * (own.T @ own)
-                B[:, to] += square * (own.T @ part)
-                P[to, to] += square * (part.T @ part)
-                row, at, rows = row + len(part), at + len(names), rows + square * len(part)
-        of_each = tuple(kind for kind, each in zip(kinds, labels, strict=True) for _ in each)
-        names = tuple(name for each in labels for name in each)
+        white: Sequence[ByChannel], residual: Sequence[Floats], patterns: Sequence[ByChannel], labels: Sequence[str],
+        kinds: Sequence[str], weight: Sequence[Floats],
+    ) -> JointProducts:  # fmt: skip
+        """Sum over runs of white columns (w, k), residuals (w,) and patterns (w, p); weight (w,): of the rows."""
+        k, whole = white[0].width, np.zeros((white[0].width + len(labels) + 1,) * 2)
+        for W, r, D, w in zip(white, residual, patterns, weight, strict=True):
+            own = ByChannel.joined([W, D]).appended(r[:, None]).scaled(w)
+            whole += own.T @ own
+        rows = float(sum((w**2).sum() for w in weight))
         return JointProducts(
-            data=Gram(A[:k, :k], A[:k, k], float(A[k, k]), round(rows)), B=B[:k], h=B[k], P=P, labels=names,
-            kinds=of_each, rows=rows,
+            data=Gram(whole[:k, :k], whole[:k, -1], float(whole[-1, -1]), round(rows)), B=whole[:k, k:-1], h=whole[k:-1, -1],
+            P=whole[k:-1, k:-1], labels=tuple(labels), kinds=tuple(kinds), rows=rows,
         )  # fmt: skip
 
     def projected(self, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:

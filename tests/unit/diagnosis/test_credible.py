@@ -22,10 +22,11 @@ def present(monkeypatch, column, left, *, surely=False):
     problem = SimpleNamespace(
         prior=Prior(0.01 * one, one, 0.0 * one, np.inf * one), member_columns=list,
         candidates=CausePrior(((0,),), np.log(0.5 * one), lambda i, j: True), columns=SimpleNamespace(names=["cause"]),
-        dictionaries=[SimpleNamespace(kind="tip", labels=["place:x"] * 3)], white_patterns=[[ByChannel.of([COVARIATE])]],
+        dictionary=SimpleNamespace(kinds=["tip"] * 3, labels=["place:x"] * 3), white_patterns=[ByChannel.of([COVARIATE])],
         white_at=lambda _: [ByChannel.of([column[:, None]])], row_places=lambda _: TIME,
+        row_cells=lambda _: (np.zeros(ROWS, int), np.arange(ROWS)), kind_of=lambda _: "tip",
     )  # fmt: skip
-    monkeypatch.setattr(credible, "_weights", lambda _: [[1.0]])
+    monkeypatch.setattr(credible, "_weights", lambda _: [np.ones(ROWS)])
     amount = float(column @ left / (column @ column))
     f = Fitted(
         members=(0,), theta=np.array([amount]), covariance=np.eye(1), log_evidence=0.0, grams=(), residual=(left,)
@@ -85,9 +86,9 @@ def test_no_row_counts_for_more_than_what_is_minor_at_the_tip_and_runs_may_lack_
     problem = SimpleNamespace(
         noise=SimpleNamespace(sigma=np.column_stack([np.full((2, 3), 0.01), encoder_mm])),
         bench=SimpleNamespace(tip_sizes=np.ones((2, 4))), floor=SimpleNamespace(tip_um=5.0),
-        channels_of={"tip": slice(0, 3), "encoder": slice(3, 4)}.__getitem__,
-        dictionaries=[SimpleNamespace(kind="tip"), SimpleNamespace(kind="encoder")],
+        channels_of=lambda kind: {"tip": slice(0, 3), "encoder": slice(3, 4)}.get(kind, slice(4, 4)),
+        row_cells=[(np.arange(3), np.zeros(3, int)), (np.arange(4), np.zeros(4, int))].__getitem__,
     )  # fmt: skip
     weights = credible._weights(problem)
-    assert weights[0] == [1.0, 1.0]
-    assert weights[1] == pytest.approx([1.0, 0.1 / (0.3 * 5.0)])
+    assert weights[0].tolist() == [1.0, 1.0, 1.0]
+    assert weights[1] == pytest.approx([1.0, 1.0, 1.0, 0.1 / (0.3 * 5.0)])

@@ -38,7 +38,7 @@ def ground(temperature):
 
 
 def test_a_run_without_temperatures_says_nothing_of_them():
-    (tip,) = dictionary([ground(np.linspace(20.0, 25.0, ROWS)), ground(None)], ["x"])
+    tip = dictionary([ground(np.linspace(20.0, 25.0, ROWS)), ground(None)], ["x"])
     warm = [n for n, label in enumerate(tip.labels) if label.startswith("temperature")]
     assert warm
     assert np.abs(tip.blocks[0][:, warm]).max() > 0.0

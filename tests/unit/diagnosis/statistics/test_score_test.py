@@ -20,27 +20,27 @@ def test_a_pattern_given_twice_counts_once():
     assert energy(2) == pytest.approx(energy(1)) and energy(1) > 0.0
 
 
-@pytest.mark.parametrize("weight", [None, [[0.5, 2.0], [1.0, 0.0]]])
+@pytest.mark.parametrize("weight", [[[1.0, 1.0], [1.0, 1.0]], [[0.5, 2.0], [1.0, 0.0]]])
 def test_normal_equations_of_patterns_are_those_of_the_stacked_rows(weight):
     """Two runs, two kinds of channel; a free column and one with a tolerance."""
     rng = np.random.default_rng(3)
     prior = Prior(np.array([0.1, 0.2]), np.ones(2), np.zeros(2), np.full(2, np.inf))
     W, r = [rng.normal(size=(30, 2)) for _ in range(2)], [rng.normal(size=30) for _ in range(2)]
     D = [[rng.normal(size=(20, 2)), rng.normal(size=(10, 1))] for _ in range(2)]
+    factor = [np.repeat(w, [20, 10]) for w in weight]
+    blocks = [np.block([[a, np.zeros((20, 1))], [np.zeros((10, 2)), b]]) for a, b in D]
     joint = JointProducts.of(
         white=[ByChannel.of([w[:20], w[20:]]) for w in W],
         residual=r,
-        blocks=[[ByChannel.of([d]) for d in run] for run in D],
-        labels=[["velocity:x", "velocity:y"], ["force:x"]],
-        kinds=["tip", "drive"],
-        weight=weight,
+        patterns=[ByChannel.of([d[:20], d[20:]]) for d in blocks],
+        labels=["velocity:x", "velocity:y", "force:x"],
+        kinds=["tip", "tip", "drive"],
+        weight=factor,
     )
     P, h = joint.projected(prior, [0])
 
-    factor = [np.repeat(w, [20, 10]) for w in weight or [[1.0, 1.0]] * 2]
     every = np.concatenate([f[:, None] * w for f, w in zip(factor, W, strict=True)])
     left = np.concatenate([f * x for f, x in zip(factor, r, strict=True)])
-    blocks = [np.block([[a, np.zeros((20, 1))], [np.zeros((10, 2)), b]]) for a, b in D]
     functions = np.concatenate([f[:, None] * d for f, d in zip(factor, blocks, strict=True)])
     taken = np.linalg.solve(every.T @ every + np.diag([0.01, 25.0]), every.T @ np.column_stack([functions, left]))
     apart = np.column_stack([functions, left]) - every @ taken
