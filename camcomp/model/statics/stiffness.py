@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.model.statics.gradients import ends_many, gradients_many
+from camcomp.model.statics.gradients import gradients_many
 from camcomp.model.statics.layout import new_work
 from camcomp.model.statics.machine import Machine, build_machine
-from camcomp.model.statics.rotation import rotation_vectors
 from camcomp.model.statics.solve import FREE, State, in_pieces, solve
 
 Array = NDArray[np.float64]
@@ -99,21 +98,6 @@ def tip_sensitivity(machine: Machine, state: State) -> TipSensitivity:
 def tip_compliance(machine: Machine, state: State) -> Array:
     """Displacement of the tip (n, 3, 3) mm/N per force at the tip, at solved points."""
     return tip_sensitivity(machine, state).by_force
-
-
-def chain_shifts(machine: Machine, tips: Array) -> Array:
-    """Shift (n, c, 6) of every free chain's end by its own geometric error at tips (n, 3): eps_i of eq. (6).
-
-    With assembly_shift what the paper computes to first order; the product solves the whole, and tests compare them.
-    """
-    perfect = build_machine(machine.nominal, machine.nominal)
-    state = solve(perfect, FREE, tips, check=False, keep=True)
-    ends = []
-    for model in (perfect, build_machine(machine.robot, machine.nominal)):
-        ends.append(np.zeros((*state.x.shape[:2], 12)))
-        ends_many(model.elastic, state.x, ends[-1], new_work(model.elastic, model.rigid))
-    R0, R1 = (e[..., :9].reshape(*e.shape[:2], 3, 3) for e in ends)
-    return np.concatenate((ends[1][..., 9:] - ends[0][..., 9:], rotation_vectors(R1 @ R0.swapaxes(-1, -2))), axis=-1)
 
 
 def assembly_shift(stiffness: Array, shifts: Array) -> tuple[Array, Array]:

@@ -7,11 +7,13 @@ import pytest
 
 from camcomp.model.config.load import load_config
 from camcomp.model.job import Job
+from camcomp.model.statics.gradients import ends_many
+from camcomp.model.statics.layout import new_work
 from camcomp.model.statics.machine import build_machine
+from camcomp.model.statics.rotation import rotation_vectors
 from camcomp.model.statics.solve import CLAMP, FREE, solve
 from camcomp.model.statics.stiffness import (
     assembly_shift,
-    chain_shifts,
     loaded_stiffness,
     tip_compliance,
     unloaded_stiffness,
@@ -23,6 +25,18 @@ Q1 = np.array([[-73.205, -73.205, -173.205]])
 
 def machine_of(name):
     return Job(load_config([f"config/{name}.yaml"])).machine
+
+
+def chain_shifts(machine, tips):
+    """Shift (n, c, 6) of every free chain's end by its own geometric error at tips (n, 3): eps_i of eq. (6)."""
+    perfect = build_machine(machine.nominal, machine.nominal)
+    state = solve(perfect, FREE, tips, check=False, keep=True)
+    ends = []
+    for model in (perfect, build_machine(machine.robot, machine.nominal)):
+        ends.append(np.zeros((*state.x.shape[:2], 12)))
+        ends_many(model.elastic, state.x, ends[-1], new_work(model.elastic, model.rigid))
+    R0, R1 = (e[..., :9].reshape(*e.shape[:2], 3, 3) for e in ends)
+    return np.concatenate((ends[1][..., 9:] - ends[0][..., 9:], rotation_vectors(R1 @ R0.swapaxes(-1, -2))), axis=-1)
 
 
 def turned(R, w):
