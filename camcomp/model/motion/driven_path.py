@@ -39,7 +39,6 @@ _CREEPS = 0.05  # of the cutting speed: a slower mean speed over missing rows me
 _SAME_FEED = 0.03  # relative tolerance of driven against programmed feed
 LEAST_FEED = 1e-3  # mm/min, in place of zero
 _RESTS = 1e-3  # of the longest step between two rows: two shorter steps in succession are a standstill
-_STEEP = np.cos(0.2)  # of the angle to the tool axis within which a log does not tell the direction across it
 _CHORD_MM = 0.02  # length over which a direction is taken: large against digits and noise of set-points
 
 
@@ -350,7 +349,7 @@ def _doubt(force: Floats, direction: Floats, time: Floats, cutting: Bools, slack
     """Error bound (n, 3) of the force at jumps between rows: half the jump, for rows within the clock offset.
 
     A force that reverses on a motion in one direction (n, 3) is that of a motion along the tool axis: the direction across it
-    stays unknown for as long as the motion does.
+    stays unknown for as long as the motion goes farther along that direction than across it.
     """
     change = np.diff(force, axis=0)
     size = np.linalg.norm(change, axis=1)
@@ -359,7 +358,7 @@ def _doubt(force: Floats, direction: Floats, time: Floats, cutting: Bools, slack
         near = (time >= time[k] - slack) & (time <= time[k + 1] + slack)
         near[k : k + 2] = True
         if force[k] @ force[k + 1] < 0.0:
-            near |= _stretch(direction @ direction[k] > _STEEP, int(k))
+            near |= _stretch(direction @ direction[k] > np.sqrt(0.5), int(k))
         out[near] = np.maximum(out[near], np.abs(change[k]))
     return out
 

@@ -52,7 +52,7 @@ def test_what_creeps_is_on_its_way(mm_per_s):
 
 def test_the_direction_of_a_force_is_unknown_for_as_long_as_the_tool_moves_along_its_axis(tmp_path):
     """Down over the side of a ball: the force turns round where the motion across the axis does, somewhere near the equator."""
-    angle = np.arange(0.8, -0.8, -25.0 * ROW_S / RADIUS)
+    angle = np.arange(1.2, -1.2, -25.0 * ROW_S / RADIUS)
     tip = RADIUS * np.column_stack([np.cos(angle), 0.0 * angle, np.sin(angle)])
     (x, _, z), (u, _, w) = tip[0], tip[-1]
     (tmp_path / "p.nc").write_text(f"G21 G90 G18\nG0 X{x} Y0 Z{z}\nG3 X{u} Z{w} I{-x} K{-z} F1500\nM2\n")
@@ -65,4 +65,4 @@ def test_the_direction_of_a_force_is_unknown_for_as_long_as_the_tool_moves_along
         logged_line=True,
     )  # fmt: skip
     across = np.abs(forces.doubt[:, 0]) > np.abs(forces.force[:, 0])
-    assert across[np.abs(angle) < 0.15].all() and not across[np.abs(angle) > 0.25].any()
+    assert across[np.abs(angle) < 0.7].all() and not across[np.abs(angle) > 0.85].any()
