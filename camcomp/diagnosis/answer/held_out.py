@@ -17,6 +17,8 @@ from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 
+_STEP = 0.02  # of an interval's half width, for differences of the gap
+
 
 def shrinkage_of(
     problem: Problem,
@@ -66,7 +68,7 @@ def _ceiling(problem: Problem, best: Fitted, seen: Bench, part: slice, free: Seq
     here = np.concatenate([gap.ravel() for gap in gaps(best.theta)])
     known = np.isfinite(here)
     if len(best.theta):
-        steps = np.maximum(np.sqrt(np.diag(best.covariance)), 1e-6)
+        steps = np.maximum(_STEP * 2.0 * np.sqrt(np.diag(best.covariance)), 1e-6)
         moved = [np.concatenate([gap.ravel() for gap in gaps(best.theta + step)]) for step in np.diag(steps)]
         D = np.stack([(m - here)[known] / s for m, s in zip(moved, steps, strict=True)], axis=1)
         change = np.linalg.lstsq(D, -here[known], rcond=1e-9)[0]

@@ -11,6 +11,7 @@ from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
 from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
 from camcomp.diagnosis.fit.patterns import KINDS, Dictionary
+from camcomp.diagnosis.fit.small_forces import bent_farther
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
@@ -203,12 +204,16 @@ class Problem:
                 far = False
             if step > 0 and size < SETTLED:
                 break
+        farther = bent_farther(self.columns, members, self.causes(members, theta, shapes))
+        if len(pushed := np.flatnonzero(farther > 1.0)):
+            both = [np.column_stack([own, self._pushed(k, farther)]) for k, own in enumerate(white)]
+            grams = self._grams_at([*index, *pushed], both, left)
         scale = Scale(total(grams), self.prior, self.candidates)
         mean, full = estimate(total(grams), self.prior, index)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
         return Fitted(
             members=members, theta=theta, covariance=covariance, log_evidence=scale(members), grams=grams,
-            extra=shapes, white=tuple(white), residual=tuple(left),
+            extra=shapes, white=tuple(white), residual=tuple(left), farther=farther,
         )  # fmt: skip
 
     def _without_members(self) -> Fitted:
@@ -225,7 +230,19 @@ class Problem:
     def white_at(self, f: Fitted) -> list[ByChannel]:
         """White columns (w, k) per run as they are at a fit."""
         index = self.member_columns(f.members)
-        return [W.exchanged(index, own) for W, own in zip(self.white, f.white, strict=True)]
+        white = [W.exchanged(index, own) for W, own in zip(self.white, f.white, strict=True)]
+        if f.farther is not None:
+            pushed = np.flatnonzero(f.farther > 1.0)
+            white = [W.exchanged(pushed, self._pushed(k, f.farther)) for k, W in enumerate(white)]
+        return white
+
+    def _pushed(self, k: int, farther: Floats) -> Floats:
+        """White columns (w, p) of run k that bend the machine farther (k,) than at nominal: the tip moves more, the force is the same."""
+        pushed = np.flatnonzero(farther > 1.0)
+        out: Floats = self.white[k][:, pushed]
+        tip = np.isfinite(self.inflate[k][:, :3]) & np.isfinite(self.noise.sigma[k, :3])
+        out[: int(tip.sum())] *= farther[pushed]
+        return out
 
     def _readings(
         self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]

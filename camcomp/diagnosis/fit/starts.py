@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.seams import missing_rows
 
@@ -22,10 +21,12 @@ if TYPE_CHECKING:
 Nuisance = tuple[str, float, list[Floats]]  # name, size, column (n, c) per run
 STARTED_MM = 0.1  # by which an actuator has to move before its play is taken up
 STOOD_MM = 5e-3  # by which it may have moved and stands: a digit of its encoder
+UNDER_WAY = 8  # rows from the one to the other, in which its state is unknown
 START_MM = 0.1  # where its carriage may stand until then: play and guides as bad as they come
 START_N = 1000.0  # and how hard its guide may hold it there
 ALWAYS_MM = 0.005  # the same where it hardly ever moves: small, or all of its rows would be unknown
 ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
+STARTING_ROWS = 2
 SWING_S = 0.03  # times the speed with which a log begins: how far a loop may then stand from where it is told
 SWINGS_S = 0.06  # in which that dies away: loops of 5 to 60 Hz as they are tuned
 BEGUN_ANEW = 3.0  # usual steps between rows: across more the motion, and a loop's state behind them, are unknown
@@ -42,7 +43,7 @@ def start_columns(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> 
         for j, a in enumerate(bench.actuators):
             lever = bench.levers[j]
             still = _standing(lever * run.run_path.row_rho[:, j])[0]
-            if still.sum() <= 1:
+            if still.sum() < STARTING_ROWS:
                 continue
             shift = np.zeros_like(bench.observed(r))
             shift[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
@@ -76,7 +77,7 @@ def unknown_starts(bench: Bench, k: int) -> Floats:
         rows: list[int] = []
         for i in (0, *turned):
             standing, under_way = _standing(rho[i:])
-            short = standing.sum() <= 1
+            short = standing.sum() < STARTING_ROWS
             rows += [i] if short else []
             rows += (i + np.flatnonzero(under_way)).tolist() if short or i == 0 else []
         unknown = np.zeros(len(path.time))
@@ -109,6 +110,6 @@ def _standing(rho: Floats) -> tuple[Bools, Bools]:
     moved = np.maximum.accumulate(np.abs(rho - rho[0]))
     still = moved < STARTED_MM
     under_way = still & (moved > STOOD_MM)
-    if under_way.sum() > BLOCK:
+    if under_way.sum() > UNDER_WAY:
         under_way = np.zeros(len(rho), bool)
     return np.asarray(still & ~under_way), under_way

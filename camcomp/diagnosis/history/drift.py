@@ -1,7 +1,7 @@
 """Course of a parameter over the days: steady, drift or jumps, and the day of its next measurement.
 
-Estimates of n days with known deviations are described by one value, a straight line, or values that change at some
-days. The Bayesian information criterion chooses (Schwarz 1978), a richer description by EQUAL_LOG_ODDS more; a jump counts its day as a parameter (Yao 1988).
+Estimates of n days with known deviations are described by one value, a straight line, or values that change at up to
+MOST_JUMPS days. The Bayesian information criterion chooses (Schwarz 1978), a richer description by EQUAL_LOG_ODDS more; a jump counts its day as a parameter (Yao 1988).
 Least squares over all divisions by dynamic programming (Jackson et al. 2005).
 """
 
@@ -15,6 +15,7 @@ import numpy as np
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
+MOST_JUMPS = 3
 FEWEST = 4  # measurements needed for a line or a jump
 
 
@@ -86,7 +87,7 @@ def _steps(values: Floats, weight: Floats) -> list[tuple[list[int], float]]:
     best = [[squares(0, b) if b else 0.0 for b in range(n + 1)]]
     start = [[0] * (n + 1)]
     out = [([0], best[0][n])]
-    for count in range(1, n):
+    for count in range(1, min(MOST_JUMPS, n - 1) + 1):
         row, origin = [np.inf] * (n + 1), [0] * (n + 1)
         for b in range(count + 1, n + 1):
             choices = [best[-1][a] + squares(a, b) for a in range(count, b)]

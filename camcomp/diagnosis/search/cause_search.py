@@ -14,7 +14,7 @@ from camcomp.diagnosis.model.verdict import VerdictInputs, Word, decide
 from camcomp.diagnosis.search.credible import MODELLED, credibility
 from camcomp.diagnosis.search.fitted_sets import ROUNDS, FittedSets
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
-from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
+from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
     Members,
@@ -89,18 +89,22 @@ class _Kept:
 def _keep_causes(problem: Problem, best: Fitted, sets: FittedSets) -> _Kept:
     """Drop members of the best answer, one by one, that an unmodelled effect explains as well.
 
-    What replaces a member above the size that counts shows, too.
+    Where one shows, members that do not predict withheld runs jointly with it are dropped first. What replaces a member
+    above the size that counts shows, too.
     """
     f, beyond = best, unexplained(problem, sets.fit(best.all_members))  # minor effects explain their part, too
     kind = at_first = unknown_kind(problem, best, beyond)
     instead = False
     while True:
-        present, replaced = credibility(problem, f, surely=kind is not None)
-        most = max(replaced, key=replaced.__getitem__, default=None)
-        if most is None or replaced[most] < EVEN:
-            break
-        instead = instead or problem.moved_um(f, (most,)) > _least(problem, _modelled(problem, f))
-        f = sets.fit(tuple(i for i in f.members if i != most))
+        kept = foretelling(problem, f) if kind else f.members
+        if kept == f.members:
+            present, replaced = credibility(problem, f, surely=kind is not None)
+            most = max(replaced, key=replaced.__getitem__, default=None)
+            if most is None or replaced[most] < EVEN:
+                break
+            instead = instead or problem.moved_um(f, (most,)) > _least(problem, _modelled(problem, f))
+            kept = tuple(i for i in f.members if i != most)
+        f = sets.fit(kept)
         beyond = unexplained(problem, f)
         kind = unknown_kind(problem, f, beyond)
     if at_first is None and f.members and is_at_floor(problem, f):

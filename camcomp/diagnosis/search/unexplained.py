@@ -70,6 +70,8 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
     usual = estimate(total(f.grams), problem.prior, index)[0]
     usual[index] = 0.0
     moved = (problem.columns.blocks[k] @ usual).reshape(left.shape[1], -1)
+    if f.farther is not None:
+        moved[:3] = (problem.columns.blocks[k] @ (usual * f.farther)).reshape(left.shape[1], -1)[:3]
     return np.asarray(left - moved.T)
 
 

@@ -11,10 +11,16 @@ from scipy.linalg import eigh
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SCALES
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.evidence import Gram, Prior
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
+from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate
 from camcomp.diagnosis.statistics.score_test import JointProducts, ResidualTest, score_test
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
+
+SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
+CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
+OWN = 0.5  # of its signal that no other member could take over, from which on a member is measured by that part alone
+NEAR = 0.5  # of what acts for a while: a row that it leaves nearer to nothing than this follows it
+SURE_SD = 3.0  # of the floor: what noise leaves of a row
 
 
 def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, ResidualTest]:
@@ -86,3 +92,91 @@ def about(problem: Problem, f: Fitted) -> tuple[list[ByChannel], list[Floats]]:
 def firm_prior(problem: Problem) -> Prior:
     """The prior to describe an unknown effect with: everything else is as stated, and no tolerance stretches to follow it."""
     return replace(problem.prior, tolerance=1e-3 * problem.prior.tolerance)
+
+
+def foretelling(problem: Problem, f: Fitted) -> Members:
+    """The members that predict a withheld run when they are fitted to the other runs; the weakest is dropped until all
+    do.
+
+    Few effects can follow an unknown one in the runs of their fit. A true cause reduces the residual of withheld runs
+    as well.
+    """
+    members = f.members
+    while members and len(problem.bench.runs) > 1:
+        now = _left_unseen(problem, f, members)
+        gains = [
+            (CONFIRMED if followed(problem, f, i) else 0.0)
+            if problem.passing(i)
+            else _gain(
+                _left_unseen(problem, f, tuple(each for each in members if each != i)) - now,
+                _own(problem, f, members, i),
+            )
+            for i in members
+        ]
+        if min(gains) >= CONFIRMED:
+            break
+        least = members[int(np.argmin(gains))]
+        members = tuple(each for each in members if each != least)
+    return members
+
+
+def followed(problem: Problem, f: Fitted, i: int) -> bool:
+    """Whether the rows for which a member acts follow it, those too that count less because they are far off or unsteady.
+
+    Other runs tell nothing of what acts for a while. A piece of what goes on all the time is found where a few rows go one
+    way by chance; those between them do not.
+    """
+    bench, index = problem.bench, problem.member_columns((i,))
+    at = problem.member_columns(f.members)
+    theta = f.theta[[at.index(c) for c in index]]
+    causes = problem.causes(f.members, f.theta, f.extra)
+    near: list[Bools] = []
+    for k in range(len(bench.runs)):
+        gap = bench.difference(k, bench.read(k, causes))
+        signal = (problem.columns.blocks[k][:, index] @ theta).reshape(-1, len(gap))[:3].T
+        size = np.linalg.norm(signal, axis=1)
+        rest = np.sum(gap[:, :3] * signal, axis=1) / np.maximum(size, 1e-12)
+        there = (size > 0.0) & np.isfinite(rest)
+        near.append(np.abs(rest[there]) < np.maximum(NEAR * size[there], SURE_SD * problem.floor.axis_mm))
+    rows = np.concatenate(near)
+    return not len(rows) or float(rows.mean()) >= CONFIRMED
+
+
+def _gain(change: Floats, own: Floats) -> float:
+    """Share of its own signal (runs,) that a member takes away from unseen runs; no run may speak against it."""
+    seen = own > SEEN_SHARE * own.max(initial=0.0)
+    if not seen.any():
+        return 0.0
+    return min(float(change[seen].sum() / own[seen].sum()), 1.0 + float(np.min(change[seen] / own[seen])))
+
+
+def _own(problem: Problem, f: Fitted, members: Members, i: int) -> Floats:
+    """Squares per row (runs,) that a member explains and the other members cannot.
+
+    Where they would take over more than OWN of it, the others may be what is there, and all that it does counts.
+    """
+    index, at = problem.member_columns((i,)), problem.member_columns(f.members)
+    others = problem.member_columns(tuple(each for each in members if each != i))
+    A, signal = total(f.grams).A, np.zeros(len(problem.columns.names))
+    signal[index] = f.theta[[at.index(c) for c in index]]
+    alone = signal.copy()
+    alone[others] -= np.linalg.solve(A[np.ix_(others, others)] + np.eye(len(others)), A[others] @ signal)
+    whole, own = ([float(each @ g.A @ each) / g.rows for g in f.grams] for each in (signal, alone))
+    return np.array(own if sum(own) > OWN * sum(whole) else whole)
+
+
+def _left_unseen(problem: Problem, f: Fitted, members: Members) -> Floats:
+    """Squares per row (runs,) that members of a set leave of runs that they were not fitted to.
+
+    Beyond what the doubt about the members' amplitudes makes; frames and clocks that are a run's own are fitted to it.
+    """
+    index, free, whole, out = problem.member_columns(members), problem.columns.of_labels, total(f.grams), []
+    for g in f.grams:
+        mean, covariance = estimate(whole - g, problem.prior, index)
+        own = mean[index]
+        A, b = g.A[np.ix_(index, index)], g.b[index]
+        square = own @ A @ own - 2.0 * b @ own - float(np.sum(A * covariance[np.ix_(index, index)]))
+        toward = g.b[free] - g.A[free][:, index] @ own
+        square -= toward @ np.linalg.lstsq(g.A[np.ix_(free, free)], toward, rcond=1e-12)[0]
+        out.append((g.c + square) / g.rows)
+    return np.array(out)

@@ -13,7 +13,7 @@ from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.seams import missing_rows
 
-BLOCK = 8  # rows that are averaged, or that an unknown state of a drive takes one by one
+BLOCK = 8  # rows that are averaged, or whose noise shares a sign
 
 
 @dataclass(frozen=True, eq=False)

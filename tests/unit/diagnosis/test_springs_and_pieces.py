@@ -1,4 +1,4 @@
-"""Intervals of springs and forces."""
+"""Intervals of springs and forces, and the rows that a temporary cause needs."""
 
 from types import SimpleNamespace
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.fit.intervals import FORMULA, STATED, joint_covariance
+from camcomp.diagnosis.search.unknown import followed
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import Prior
@@ -49,3 +50,32 @@ def test_rows_that_tell_force_and_spring_apart_say_it_better():
 
 def test_what_is_moved_at_the_tip_is_known_all_the_same():
     assert deviation_of_force(1e-4, log=False) < 0.1 * STATED
+
+
+@pytest.mark.parametrize(
+    ("seen_um", "answer"),
+    [
+        ((117, 121, 113, 119, 60, 116), True),
+        ((379, 243, 134, 115, -275), False),  # rings, and is weighed where it is least
+        ((117, -20, 121, 3, -1), False),
+        ((9, 1, 4, 12, 7), True),  # noise says as much of it
+    ],
+)
+def test_rows_follow_what_acts_while_they_are_read(seen_um, answer):
+    shift = 1e-3 * np.median(seen_um)
+    n = len(seen_um)
+    channels = np.zeros((9, n + 40, 1))
+    channels[2, 20 : 20 + n] = 1.0
+    rest = np.zeros((n + 40, 9))
+    rest[20 : 20 + n, 2] = 1e-3 * np.array(seen_um) - shift
+    problem = SimpleNamespace(
+        bench=SimpleNamespace(runs=[None], read=lambda k, causes: None, difference=lambda k, reading: rest),
+        columns=SimpleNamespace(blocks=(ByChannel.of(channels),)), member_columns=list, causes=lambda *a: [],
+        floor=SimpleNamespace(axis_mm=0.003),
+    )  # fmt: skip
+    assert (
+        followed(
+            problem, Fitted(members=(0,), theta=np.array([shift]), covariance=np.eye(1), log_evidence=0.0, grams=()), 0
+        )
+        is answer
+    )
