@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
+from camcomp.diagnosis.recordings.numbered_joints import numbered_joints
 from camcomp.diagnosis.recordings.sampled import SampledColumns, some
 from camcomp.diagnosis.recordings.units import SI, factor_to, split_unit, unit_of
 from camcomp.ground.errors import ConfigError
@@ -69,6 +70,7 @@ def pick_columns(
     usual = usual_names(actuators, columns)
     taken = {(each.part, each.column) for each in (*picked.columns.values(), *picked.times.values())}
     found = {log: _usual(parts, log, names, taken) for log, names in usual.items() if log not in (TIME, *told)}
+    found |= _by_number(parts, columns, {log for log, hits in found.items() if hits} | set(told), picked.notes)
     for log, hits in found.items():
         rivals = [other for other in found if other != log and set(found[other]) & set(hits)]
         if len(hits) == 1 and not rivals:
@@ -80,6 +82,37 @@ def pick_columns(
             for hit in _usual([part], TIME, usual[TIME], {(0, column) for k, column in taken if k == i})[:1]:
                 picked.times[i] = replace(hit, part=i)
     return picked
+
+
+def _by_number(
+    parts: Sequence[SampledColumns], columns: LogColumns, there: set[str], notes: list[str]
+) -> dict[str, list[Pick]]:
+    """Candidates for channels of which no column was found by name, in series of columns that count the joints."""
+    out: dict[str, list[Pick]] = {}
+    for i, part in enumerate(parts):
+        for channel, series in numbered_joints([_plain(name) for name in part.names], len(columns.encoder)).items():
+            logs = getattr(columns, channel)
+            if there.intersection(logs):
+                continue
+            for each in series:
+                names = f"{part.names[each[0]]} to {part.names[each[-1]]}"
+                picks = [_pick(part, i, j, log, channel != "drive") for j, log in zip(each, logs, strict=True)]
+                good = [pick for pick in picks if pick is not None]
+                if len(good) < len(logs):
+                    unit = unit_of(logs[0]).replace("Nmm", "Nm")
+                    notes.append(f"{names} left out, they state no unit: {part.names[each[0]]}_{unit} would be one")
+                    continue
+                notes.append(f"{names} are taken as {logs[0]} to {logs[-1]}, in this order")
+                for log, pick in zip(logs, good, strict=True):
+                    out.setdefault(log, []).append(pick)
+    return out
+
+
+def _pick(part: SampledColumns, i: int, column: int, log: str, bare: bool) -> Pick | None:
+    """A column as that of a log; None with a unit of another quantity, and without a unit unless it may be bare."""
+    unit = _unit(part, column, log)
+    factor = factor_to(log, unit) if unit else None
+    return Pick(i, column, factor) if factor is not None or (bare and not unit) else None
 
 
 def usual_names(actuators: Sequence[str], columns: LogColumns) -> dict[str, tuple[str, ...]]:
@@ -171,18 +204,12 @@ def _usual(parts: Sequence[SampledColumns], log: str, usual: Sequence[str], take
     free = [
         (i, j, _plain(name)) for i, part in enumerate(parts) for j, name in enumerate(part.names) if (i, j) not in taken
     ]
-    wanted_unit = log.startswith("act_") and unit_of(log) in _EFFORTS
+    stated = log.startswith("act_") and unit_of(log) in _EFFORTS
     for wanted in (log.lower(), *usual):
         for fits in (_same, _same_with_unit, _ends):
-            hits = [(i, j) for i, j, name in free if fits(name, wanted)]
-            units = {(i, j): _unit(parts[i], j, log) for i, j in hits}
-            factors = {key: factor_to(log, unit) if unit else None for key, unit in units.items()}
-            bare = wanted == log.lower() or not wanted_unit
-            good = [
-                Pick(i, j, factors[i, j])
-                for i, j in hits
-                if (bare and not units[i, j]) or (units[i, j] and factors[i, j] is not None)
-            ]
+            bare = wanted == log.lower() or not stated
+            tried = [_pick(parts[i], i, j, log, bare) for i, j, name in free if fits(name, wanted)]
+            good = [pick for pick in tried if pick is not None]
             if len(good) > 1 and fits is _same:
                 good = good[:1]  # twice in one table: an error when it is read
             if good:

@@ -27,7 +27,7 @@ _TO_LOG = {  # unit of the log: factors to it, by unit of the recording in lower
     "C": {"c": 1.0, "°c": 1.0, "degc": 1.0},
 }
 _BASE = {"mm": "m", "rad": "rad", "s": "s", "N": "n", "Nmm": "nm", "C": "c"}
-_BRACKETS = re.compile(r"(.+?)[\s_]*[\[(]([^\[\]()]*)[\])]")
+_BRACKETS = re.compile(r"(.+?)[\s_]*[\[(](?!\d+[\])])([^\[\]()]*)[\])]")  # position[0] states none
 _CLOCK = re.compile(  # 11.10.2022 15:06:48.043, 2022-10-11T15:06:48,043Z, 15:06:48.043; 10/11/2022 is of two days
     r"(?:(?P<day>\d{1,2})\.(?P<month>\d{1,2})\.(?P<year>\d{4})[ T]+|(?P<iso>\d{4}-\d{2}-\d{2})[ T]+)?"
     r"(?P<h>[01]?\d|2[0-3]):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)Z?",

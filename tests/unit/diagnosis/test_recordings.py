@@ -423,3 +423,43 @@ def test_a_clock_that_breaks_off_is_refused_with_its_place(read):
     with pytest.raises(ConfigError, match="no date or time like the cells above it") as caught:
         read_text_table(b"Time;x\n15:06:48;1\n7;2\n", "a.csv")[0].read(0)
     assert (caught.value.rule, caught.value.at.line) == ("CC422", 3)
+
+
+@pytest.mark.parametrize(
+    ("asked", "met", "first"),
+    [
+        ("target_q_{}", "actual_q_{}", 0),  # RTDE of Universal Robots
+        ("q_d_{}", "q_{}", 1),
+        ("cmd/position[{}] [deg]", "state/position[{}] [deg]", 0),
+        ("Joint{}TargetPosition", "Joint{}ActualPosition", 1),
+    ],
+)
+def test_columns_that_count_all_joints_are_joints_in_order(read, asked, met, first):
+    heads = [text.format(k + first) for text in (asked, met) for k in range(6)]
+    rows = [",".join(str(each) for each in (t, *range(t, t + 12))) for t in range(3)]
+    got = read("\n".join([",".join(["time", *heads]), *rows]), "--radians")
+    scale = np.pi / 180.0 if "deg" in asked else 1.0
+    for k, joint in enumerate(JOINTS):
+        assert got.logs["poses"][f"cmd_{joint}_rad"][0] == pytest.approx(scale * k)
+        assert got.logs["poses"][f"act_{joint}_rad"][0] == pytest.approx(scale * (k + 6))
+    assert "are taken as act_shoulder_pan_rad to act_wrist_3_rad, in this order" in got.told
+
+
+def test_numbers_that_may_not_be_the_joints_are_not_guessed(read):
+    head = [
+        "time",
+        *(f"q_{k}" for k in range(7)),
+        *(f"actual_qd_{k}" for k in range(6)),
+        *(f"tau_{k}" for k in range(6)),
+    ]
+    got = read(",".join(head) + "\n" + ",".join("0" for _ in head) + "\n")
+    assert got.code == 2 and "no column for act_shoulder_pan_rad" in got.told
+    head[1:8] = [f"q_{k}" for k in range(6)]
+    twice = read(",".join([*head, *(f"pos_{k}" for k in range(6))]) + "\n" + ",".join("0" for _ in range(25)) + "\n")
+    assert twice.code == 2 and "it could be q_0, pos_0" in twice.told
+    forces = [f"tau_{k}" for k in range(6)]
+    plain = read(",".join([*head[:7], *forces, "x", "y", "z"]) + "\n" + ",".join("1" for _ in range(16)) + "\n")
+    assert "tau_0 to tau_5 left out, they state no unit: tau_0_Nm would be one" in plain.told
+    named = ",".join([*head[:7], *(f"{each}_Nm" for each in forces), "x", "y", "z"])
+    taken = read(named + "\n" + ",".join("1" for _ in range(16)) + "\n", name="b.csv")
+    assert "tau_0_Nm to tau_5_Nm are taken as act_shoulder_pan_Nmm to act_wrist_3_Nmm" in taken.told
