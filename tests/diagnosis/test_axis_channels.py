@@ -153,3 +153,55 @@ def test_a_measured_servo_has_a_speed_limit_and_no_lag(tmp_path):
     effects = [c.effect for c in result.causes]
     assert "speed_limit" in effects and "servo_lag" not in effects
     assert result.shrinkage.ratio > 0.8
+
+
+TWO_LINKS = """robot:
+  name: two links
+  type: serial
+  convention: modified
+  joints:
+    - {name: J1, alpha_deg: -90, stiffness_Nmm_per_rad: 1.0e+9}
+    - {name: J2, a_mm: 500, stiffness_Nmm_per_rad: 1.0e+9}
+  flange: {translation_mm: [400, 0, 0]}
+tool: {length_mm: 0}
+workpiece: {origin_mm: [900, 0, 0]}
+"""
+LINKS = 0.5, 0.25, 8.0, 0.2, 5.0, 0.3, 0.1  # m, m, kg, m, kg, kg m2, kg m2: first length, centres, masses, inertias
+RUBS = np.array([[9.0, 6.0], [4.0, 2.5]])  # N m, N m s/rad of both joints
+
+
+def two_link_log(folder, name, seed):
+    """Set-points as followed, and torques by Siciliano et al., Robotics, 7.3.2, with friction that turns within 5 mrad/s."""
+    a1, l1, m1, l2, m2, i1, i2 = LINKS
+    g, rng = 9.80665, np.random.default_rng(seed)
+    t, q1, v1, w1 = course(seed)
+    _, q2, v2, w2 = course(seed + 20)
+    q2, v2, w2 = 2.0 * q2, 2.0 * v2, 2.0 * w2
+    c2, s2 = np.cos(q2), np.sin(q2)
+    both = m2 * (l2**2 + a1 * l2 * c2) + i2
+    torques = [
+        (i1 + m1 * l1**2 + i2 + m2 * (a1**2 + l2**2 + 2 * a1 * l2 * c2)) * w1
+        + both * w2 - m2 * a1 * l2 * s2 * (2 * v1 * v2 + v2**2)
+        - (m1 * l1 + m2 * a1) * g * np.cos(q1) - m2 * l2 * g * np.cos(q1 + q2),
+        both * w1 + (i2 + m2 * l2**2) * w2 + m2 * a1 * l2 * s2 * v1**2 - m2 * l2 * g * np.cos(q1 + q2),
+    ]  # fmt: skip
+    columns = {"t_s": t}
+    for name_, q in (("J1", q1), ("J2", q2)):
+        columns[f"act_{name_}_rad"] = q + rng.normal(0, 1e-5, len(t))
+    for k, (speed, torque) in enumerate(zip((v1, v2), torques, strict=True)):
+        rubs = RUBS[k, 0] * np.tanh(speed / 0.005) + RUBS[k, 1] * speed
+        columns[f"act_J{k + 1}_Nmm"] = 1e3 * (torque + rubs + rng.normal(0, 0.3, len(t)))
+    write(folder, name, columns)
+
+
+def test_joints_that_move_together_do_not_bend_each_others_friction(tmp_path):
+    (tmp_path / "arm.yaml").write_text(TWO_LINKS)
+    for name, seed in (("a", 1), ("b", 5)):
+        two_link_log(tmp_path, name, seed)
+    result = asked(tmp_path, ["arm.yaml"], "ab", holdout=["b"])
+    assert result.verdict == "identified"
+    for k, joint in enumerate(("J1", "J2")):
+        (friction,) = [c for c in result.causes if c.target == joint]
+        for name, true in zip(("force_Nmm", "viscous_Nmms_per_rad"), 1e3 * RUBS[k], strict=True):
+            low, high = friction.parameters[name].ci95
+            assert low <= true <= high and high - low < 0.2 * true

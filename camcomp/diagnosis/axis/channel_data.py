@@ -12,8 +12,10 @@ from camcomp.diagnosis.axis.gate import within_a_row
 from camcomp.diagnosis.axis.row_noise import noise_of
 from camcomp.ground.datatypes import Floats
 
+LEAST = 1e-3  # of the largest column: below it bodies do not show
 HEALTHY_SHARE = 0.3  # of the channel's size: scale of a size that every axis has
 CLOCK, TURNING = "clock", "turning"  # kinds: rows that are late; friction while it turns round, limited by its peak
+BODIES = "bodies"  # kind: masses, first moments and inertias of the links behind a hinge, as a base of their columns
 Sizes = Mapping[str, Floats]  # kind -> columns (n, q)
 Response = Callable[[int, Sequence[tuple[AxisCause, Floats]]], Floats]  # run, causes that act -> values (n,)
 
@@ -24,7 +26,8 @@ class ChannelData:
 
     response: what causes with their amplitudes (d,) add to the channel of run k (n,). floor: noise of the channel. train: runs
     that are fitted. level: constant without a meaning. times (n,) s per run. clock: standard deviation of the instants of rows
-    against the motion, s. noise (n,) per run: of rows, in floors; 1 where it is not given.
+    against the motion, s. noise (n,) per run: of rows, in floors; 1 where it is not given. inertia: columns of healthy sizes
+    that are force of inertia alone.
     """
 
     values: Sequence[Floats]
@@ -37,6 +40,7 @@ class ChannelData:
     level: float = 0.0
     clock: float = 0.0
     noise: Sequence[Floats] = ()
+    inertia: Sequence[Sizes] = ()
 
     def in_floors(self, rows: Mapping[int, Floats]) -> Floats:
         """Rows of the fitted runs one after the other, each over its noise in floors. rows: values (n,) or columns (n, k) by run."""
@@ -63,6 +67,7 @@ class ChannelData:
             most = HEALTHY_SHARE * max(size, self.floor)
             out[kind] = np.divide(most, each, out=np.zeros_like(each), where=each > 0.0)
             out[kind] = np.full(1, self.clock) if kind == CLOCK else out[kind]
+            out[kind] = np.full(n := own.shape[1], most / np.sqrt(max(n, 1))) if kind == BODIES else out[kind]
         return out
 
     def refined(self, left: Sequence[Floats], sizes: Mapping[str, Floats]) -> ChannelData:
@@ -74,11 +79,23 @@ class ChannelData:
         if self.clock == 0.0:
             return self
         slopes = [np.gradient(y - each, t)[:, None] for y, each, t in zip(self.values, left, self.times, strict=True)]
-        inertia = [own["acceleration"] @ sizes["acceleration"] for own in self.healthy]
+        inertia = [np.sum([own[kind] @ sizes[kind] for kind in own], axis=0) for own in self.inertia]
         return replace(
             self, healthy=[{**own, CLOCK: each} for own, each in zip(self.healthy, slopes, strict=True)],
             noise=[np.hypot(1.0, within_a_row(each) / self.floor) for each in inertia],
         )  # fmt: skip
+
+
+def base_of(columns: Sequence[Floats]) -> Floats:
+    """Combinations (c, b) of columns (n, c) per run that tell them apart, each column at its usual size.
+
+    Gautier, Khalil, IEEE Trans. Robotics and Automation 6 (1990): only these combinations of inertial parameters show.
+    """
+    rows = np.concatenate(columns)
+    size = np.sqrt(np.mean(rows**2, axis=0))
+    unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > LEAST * size.max(initial=0.0))
+    values, vectors = np.linalg.eigh(unit[:, None] * (rows.T @ rows / len(rows)) * unit)
+    return np.asarray(unit[:, None] * vectors[:, values > LEAST**2 * values.max(initial=0.0)])
 
 
 def shrunk(A: Floats, y: Floats, prior: Floats, sd: float) -> tuple[Floats, Floats]:

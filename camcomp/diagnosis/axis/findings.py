@@ -22,7 +22,6 @@ ROWS = 50  # below which a run says nothing
 FIRST_MOVE_MM = 0.2  # after which friction has its sense
 MOVING = 0.1  # of the fastest row's way
 FAR = 10.0  # times as far goes an axis that moves
-ANSWER_S = (0.02, 0.3)  # ahead of a push, and behind it until a loop has answered
 GAP_MARGIN_ROWS = 5  # rows of which a gap leaves speed and acceleration uncertain
 
 
@@ -119,14 +118,6 @@ class AxisRun:
         if not near.any() or near.mean() > EVEN:
             return self
         return replace(self, seen=~near)
-
-    def unpushed(self, pushed: Sequence[tuple[str, float, float]]) -> AxisRun:
-        """The run with rows unseen in which something pushed the axis, or its loop still answered to that."""
-        away = np.ones(len(self.time), bool)
-        for name, begin, end in pushed:
-            if name == self.name:
-                away &= (self.time < begin - ANSWER_S[0]) | (self.time > end + ANSWER_S[1])
-        return replace(self, seen=self.clear & away) if (self.clear & away).sum() >= ROWS else self
 
     def moved(self) -> Bools:
         """Rows (n,) from the first move on: which way friction held the axis before nobody knows. All where it stays."""
@@ -225,7 +216,6 @@ class AxisFindings:
     following: AxisChannel | None = None
     force: AxisChannel | None = None
     behind: AxisChannel | None = None
-    pushed: list[tuple[str, float, float]] = field(default_factory=list)  # for a while: run, and from and to when, s
     ripple: Ripple | None = None
     unknown_in: list[tuple[str, float]] = field(default_factory=list)  # covariate kind, share
     unknown_chance: float = 0.0  # log10, the least of all that is unknown

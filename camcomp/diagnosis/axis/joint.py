@@ -2,9 +2,9 @@
 
     encoder - set-point = control effects + a q'' + c tanh(q'/v0) + o + w1 sin q + w2 cos q + e    q: behind these effects
     load - encoder      = play, springs, screws + o + d q' + f tau + e        d: delay between two encoders; f tau: compliance
-    drive torque        = friction + J q'' + sum_k J_k q_k'' + weight(q) + o + e
+    drive torque        = friction + J q'' + bodies(q, q', q'') + o + e
 
-Weight is linear in the first moments of the links behind a joint, whatever their masses are.
+Bodies are linear in masses, first moments and inertias of the links behind a joint, whatever these are.
 
 Source: Siciliano et al., Robotics, 7.3; `channel_fit` for the choice.
 """
@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.channel_data import TURNING, ChannelData, Response, healthy_sizes
+from camcomp.diagnosis.axis.channel_data import BODIES, TURNING, ChannelData, Response, base_of, healthy_sizes
 from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel
 from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
@@ -74,9 +74,9 @@ def study_channel(found: AxisFindings, rows: JointRows, around: AxisSurroundings
         return axes[k].channel(rows.channel, causes)[seen[k]] if causes else np.zeros(len(rows.values[k]))
 
     following = rows.channel == "following"
-
+    healthy, inertia = _healthy(found, rows, around, seen, axes)
     data = ChannelData(
-        values=rows.values, healthy=_healthy(found, rows, around, seen, axes), covariates=_covariates(found, rows, around),
+        values=rows.values, healthy=healthy, inertia=inertia, covariates=_covariates(found, rows, around),
         response=response, floor=rows.floor, train=rows.train, times=[m.time for m in rows.moves], noise=rows.noise,
         clock=WITHIN * _step(rows.moves) if rows.channel == "force" else 0.0,
         level=0.0 if following else float(np.mean(np.concatenate([rows.values[k] for k in rows.train]))),
@@ -89,12 +89,8 @@ def study_channel(found: AxisFindings, rows: JointRows, around: AxisSurroundings
         done = _behind_causes(data, done, columns)
         found.laws = [_written_law(found, texts, done.sizes)]
     if rows.channel == "force" and "disturbance" not in without:
-        done, pushes = _with_pushes(found.name, data, terms, done, rows)
+        done = _with_pushes(found.name, data, terms, done, rows)
         done = _with_pushes_where_judged(found.name, data, done, rows)
-        start = {run.name: run.started for run in rows.runs}
-        found.pushed = [
-            (str(p.run), p.shape["from_s"] - start[str(p.run)], p.shape["to_s"] - start[str(p.run)]) for p in pushes
-        ]
     if rows.channel == "behind":  # without zeros and clocks of two encoders, the rest is an error of the machine
         apart = [sum(own[kind] @ done.sizes[kind] for kind in ("offset", "delay")) for own in data.healthy]
         rows = replace(rows, values=[each - own for each, own in zip(rows.values, apart, strict=True)])
@@ -104,7 +100,7 @@ def study_channel(found: AxisFindings, rows: JointRows, around: AxisSurroundings
         told = {k: axes[k].known(behind)[seen[k]] for k in rows.test}
         sure = [told[k] if k in told and told[k].any() else own for k, own in enumerate(sure)]
     channel = _channel(rows, done, data.response, sure)
-    _tell(found, rows, done, data.healthy)
+    _tell(found, rows, done, data)
     if (
         rows.channel != "force" and float(np.std(channel.rows)) <= rows.floor
     ):  # there is no gap that causes would explain
@@ -202,10 +198,15 @@ def _healthy(
     around: AxisSurroundings,
     seen: Sequence[np.ndarray],
     axes: Sequence[DrivenAxis],
-) -> list[dict[str, Floats]]:
-    """Columns of the sizes that every axis has, by kind, of every run."""
+) -> tuple[list[dict[str, Floats]], list[dict[str, Floats]]]:
+    """Columns of the sizes that every axis has, by kind, of every run, and those that are force of inertia alone."""
     fastest = max((float(np.abs(rows.moves[k].speed).max(initial=0.0)) for k in rows.train), default=0.0)
-    out = []
+    bodies = [
+        around.bodies(found.name, run, m, found.wide) if rows.channel == "force" and run.revolute else None
+        for run, m in zip(rows.runs, rows.moves, strict=True)
+    ]
+    base = base_of([parts[0] for k in rows.train if (parts := bodies[k]) is not None] or [np.zeros((1, 0))])
+    out, inertia = [], []
     for k, m in enumerate(rows.moves):
         one, hinge = np.ones((len(m.time), 1)), rows.runs[k].revolute
         turns = np.tanh(m.speed / max(CREEP * fastest, 1e-12))[:, None]
@@ -227,17 +228,18 @@ def _healthy(
             own["friction"] = np.stack([m.reversal(way) for way in TURNS_MM], axis=1)
         if rows.asymmetric:
             own["asymmetry"] = np.abs(m.speed)[:, None]
-        if rows.channel == "force" and not hinge:
+        if rows.channel == "force":
             own[TURNING] = _turning(m)
-        if rows.channel == "force" and hinge:
-            own["weight"] = around.weights(found.name, rows.runs[k])[seen[k]]
-            stated = axes[k].weight[seen[k]], axes[k].inertia[seen[k]]
-            if np.ptp(stated[0]) > 0.0 or np.ptp(stated[1]) > 0.0:
-                own["stated masses"] = np.stack(stated, axis=1)
+        moved = {kind: own[kind] for kind in own if kind == "acceleration"}
+        if (parts := bodies[k]) is not None:
+            own[BODIES], moved[BODIES] = parts[0] @ base, (parts[0] - parts[1]) @ base
+            stated = np.stack([axes[k].weight[seen[k]], axes[k].inertia[seen[k]]], axis=1)
+            if np.ptp(stated, axis=0).any():
+                own["stated masses"], moved["stated masses"] = stated, stated * [0.0, 1.0]
         out.append(own)
+        inertia.append(moved)
     common = set.intersection(*(set(each) for each in out))
-    widths = {kind: min(each[kind].shape[1] for each in out) for kind in common}
-    return [{kind: own[kind][:, : widths[kind]] for kind in own if kind in common} for own in out]
+    return [{kind: own[kind] for kind in own if kind in common} for own in out], inertia
 
 
 def _turning(m: AxisTravel) -> Floats:
@@ -261,8 +263,8 @@ def _covariates(found: AxisFindings, rows: JointRows, around: AxisSurroundings) 
 
 def _with_pushes(
     name: str, data: ChannelData, terms: Sequence[AxisCause], done: ChannelFit, rows: JointRows
-) -> tuple[ChannelFit, list[AxisCause]]:
-    """The fit jointly with disturbance forces, as long as the evidence takes one more, and these.
+) -> ChannelFit:
+    """The fit jointly with disturbance forces, as long as the evidence takes one more.
 
     data, terms: what is fitted to the runs `data.train`.
     """
@@ -281,14 +283,14 @@ def _with_pushes(
         if sum(c.effect == "disturbance" for c in again.causes) < len(more):
             break
         done, pushes = again, more
-    return done, pushes
+    return done
 
 
 def _with_pushes_where_judged(name: str, data: ChannelData, done: ChannelFit, rows: JointRows) -> ChannelFit:
     """The fit with the disturbance forces of runs that are judged only, from the residual of each."""
     for k in rows.test:
-        alone, pushes = _with_pushes(name, data.residual_of(k, done.left), [], done, rows)
-        if not pushes:
+        alone = _with_pushes(name, data.residual_of(k, done.left), [], done, rows)
+        if alone is done:
             continue
         left = [*done.left]
         left[k] = left[k] - data.response(k, alone.acting)
@@ -315,7 +317,7 @@ def _push(name: str, window: Window, rows: JointRows) -> AxisCause:
     )  # fmt: skip
 
 
-def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, healthy: Sequence[Mapping[str, Floats]]) -> None:
+def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, data: ChannelData) -> None:
     """Sizes that every axis has, for the reader, in the units of the axis; none where the rows do not determine them."""
     if not np.isfinite(done.covariance).all():
         return
@@ -334,15 +336,15 @@ def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, healthy: Seque
             "mass_kg": done.combined({"acceleration": [1e3]}), "constant_N": done.combined({"offset": [1.0]})
         }  # fmt: skip
         return
-    parts = {kind: np.concatenate([healthy[k][kind] for k in rows.train]) for kind in healthy[0]}
-    weight, inertia = parts["weight"] @ done.sizes["weight"], {"acceleration": [lever**2]}
-    if "stated masses" in parts:
-        stated, speeding = parts["stated masses"], parts["acceleration"][:, 0]
-        weight = weight + stated[:, 0] * done.sizes["stated masses"][0]
-        by_own = float(stated[:, 1] @ speeding / max(float(speeding @ speeding), 1e-300))  # of the masses' inertia
-        inertia["stated masses"] = [0.0, lever**2 * by_own]
+    parts = {kind: np.concatenate([data.inertia[k][kind] for k in rows.train]) for kind in data.inertia[0]}
+    every = {kind: np.concatenate([data.healthy[k][kind] for k in rows.train]) for kind in parts}
+    weight = np.sum([(every[kind] - parts[kind]) @ done.sizes[kind] for kind in parts], axis=0)
+    speeding = parts["acceleration"][:, 0]  # its own: by which the bodies' inertia is judged
+    by_own = {
+        kind: lever**2 * (speeding @ each) / max(float(speeding @ speeding), 1e-300) for kind, each in parts.items()
+    }
     found.details["force"] = {
-        "inertia_Nmms2_per_rad": done.combined(inertia),
+        "inertia_Nmms2_per_rad": done.combined(by_own),
         "constant_Nmm": done.combined({"offset": [lever]}),
         "weight_Nmm": round(lever * float(np.std(weight)), 3),
     }

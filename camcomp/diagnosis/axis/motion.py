@@ -24,14 +24,18 @@ APART_S = 0.1  # between the rows that are compared: a push for a while shows at
 REWEIGHTED = 5  # times, for a fit by least absolute deviations
 
 
-def encoder_width(runs: list[AxisRun], train: list[int]) -> int:
-    """Half width of the local cubics: what a coarse or noisy encoder does to accelerations shows in the drive force."""
-    rows = [r for k, r in enumerate(runs) if k in train and np.isfinite(r.force).all()]
+def encoder_width(runs: list[AxisRun], train: list[int], bodies: list[Floats] | None) -> int:
+    """Half width of the local cubics: what a coarse or noisy encoder does to accelerations shows in the drive force.
+
+    bodies (n, b) per run: columns of the bodies behind the axis in its drive force, None where they do not change it.
+    """
+    told = [k for k in train if np.isfinite(runs[k].force).all()]
+    rows = [runs[k] for k in told]
     if not rows:
         return WIDE[0]
     wide = [w for w in WIDE if 2 * w + 1 < min(len(r.time) for r in rows) / 4]
-    forces = [r.force for r in rows]
-    least = [_misfit(rows, forces, [travel(r.time, r.encoder, w) for r in rows]) for w in wide]
+    forces, behind = [r.force for r in rows], _beside(bodies, runs, told)
+    least = [_misfit(rows, forces, [travel(r.time, r.encoder, w) for r in rows], behind) for w in wide]
     return WIDE[int(np.argmin([0.95 * least[0], *least[1:]]))] if least else WIDE[0]
 
 
@@ -48,13 +52,16 @@ def motion_of(
     values: list[Floats],
     train: list[int],
     late: float | None,
+    *,
     followed: list[Floats] | None = None,
+    bodies: list[Floats] | None = None,
 ) -> tuple[list[AxisRun], list[AxisTravel], list[Floats]]:
     """What moved while a channel had its values (n,): set-points, as late as they are followed, where that explains them as well.
 
-    followed: positions (n,) of the axis by the fit of its following error, in place of set-points. The noise of an encoder is
-    in its following error, too, and would explain a part of itself. With the runs and their values, where somebody saw how fast the axis was, and,
-    in runs of `train`, where it no longer matters how it moved before its log began.
+    followed: positions (n,) of the axis by the fit of its following error, in place of set-points. bodies (n, b) per run:
+    columns of the bodies behind a joint; the force then tells the better motion, while the noise of an encoder is in its own
+    following error, and would explain a part of itself. With the runs and their values, where somebody saw how fast the axis
+    was, and, in runs of `train`, where it no longer matters how it moved before its log began.
     """
     encoders = [travel(r.time, r.encoder, found.wide) for r in runs]
 
@@ -67,9 +74,10 @@ def motion_of(
         return kept(encoders, [r.clear for r in runs])
     mine = [runs[k] for k in train]
     told = [values[k] for k in train]
+    behind = _beside(bodies, runs, train)
 
     def misfit(moves: list[AxisTravel]) -> float:
-        return _misfit(mine, told, [moves[k] for k in train])
+        return _misfit(mine, told, [moves[k] for k in train], behind)
 
     def narrowest(paths: list[Floats], behind: float) -> list[AxisTravel]:
         ways = [[travel(r.time, x, wide, behind) for r, x in zip(runs, paths, strict=True)] for wide in SETPOINT_WIDE]
@@ -77,11 +85,16 @@ def motion_of(
         return next(each for each, own in zip(ways, left, strict=True) if own <= SAME_MISFIT * min(left))
 
     setpoints = narrowest([r.setpoint for r in runs], late)
-    by_encoder = misfit(encoders) < ENCODER_BETTER * misfit(setpoints)
+    by_encoder = misfit(encoders) < (ENCODER_BETTER if bodies is None else 1.0) * misfit(setpoints)
     if followed is not None and not by_encoder:
         setpoints = narrowest(followed, 0.0)
     begun = [r.time >= r.time[0] + late * (_fades(r.gap) if k in train else 0.0) for k, r in enumerate(runs)]
     return kept(encoders if by_encoder else setpoints, begun)
+
+
+def _beside(bodies: list[Floats] | None, runs: list[AxisRun], which: list[int]) -> list[Floats]:
+    """Columns (n, b) of bodies of some runs."""
+    return [np.zeros((len(runs[k].time), 0)) if bodies is None else bodies[k] for k in which]
 
 
 def _fades(gap: Floats) -> float:
@@ -94,14 +107,14 @@ def _usual(m: AxisTravel) -> Floats:
     return np.stack([np.ones_like(m.time), 1e-3 * m.acceleration, m.speed, np.sign(m.speed)], axis=1)
 
 
-def _misfit(runs: list[AxisRun], values: list[Floats], moves: list[AxisTravel]) -> float:
-    """Mean absolute residual of a channel's changes after a fit of the changes of the usual terms.
+def _misfit(runs: list[AxisRun], values: list[Floats], moves: list[AxisTravel], bodies: list[Floats]) -> float:
+    """Mean absolute residual of a channel's changes after a fit of the changes of the usual terms, and of columns (n, b).
 
     Changes and absolute values keep a disturbance force from outweighing the corners of a motion.
     """
     changes = [
-        _changes(r.time[r.clear], np.column_stack([_usual(m)[:, 1:], y])[r.clear])
-        for r, m, y in zip(runs, moves, values, strict=True)
+        _changes(r.time[r.clear], np.column_stack([_usual(m)[:, 1:], b, y])[r.clear])
+        for r, m, y, b in zip(runs, moves, values, bodies, strict=True)
     ]
     rows = np.concatenate(changes)
     A, y = rows[:, :-1], rows[:, -1]

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from camcomp.diagnosis.axis import answer
+from camcomp.diagnosis.axis.channel_data import base_of
 from camcomp.diagnosis.axis.findings import ROWS, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.joint import JointRows, study_channel
 from camcomp.diagnosis.axis.law import axis_law
@@ -23,7 +24,7 @@ from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
 from camcomp.diagnosis.axis.next_moves import next_moves
 from camcomp.diagnosis.axis.noise_floor import between_rows, following_floor, rows_floor
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
-from camcomp.diagnosis.axis.terms import AxisTravel, travel
+from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, travel
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM, StatedDeviation
 from camcomp.diagnosis.model.verdict import VerdictInputs, Word, decide
@@ -135,15 +136,25 @@ def _verdict(found: Sequence[AxisFindings]) -> Word:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AxisTask:
-    """What is asked of one axis: its usable runs, numbers of those that are fitted and of those that are judged only, effects
+    """What is asked of one axis: its name, usable runs, numbers of those that are fitted and of those that are judged only, effects
     left out, and what is around it.
     """
 
+    name: str
     usable: list[AxisRun]
     train: list[int]
     test: list[int]
     without: set[str]
     around: AxisSurroundings
+
+    @cached_property
+    def bodies(self) -> list[Floats] | None:
+        """Columns (n, b) of the bodies behind the axis in the drive force, per run; None where they do not change it."""
+        if not self.train or not any(r.revolute and np.isfinite(r.force).all() for r in self.usable):
+            return None
+        every = [self.around.bodies(self.name, r, travel(r.time, r.encoder), WIDE[0])[0] for r in self.usable]
+        base = base_of([every[k] for k in self.train])
+        return [each @ base for each in every]
 
     def rows(self, moves: list[AxisTravel], values: list[Floats], **of_channel: Any) -> JointRows:
         """Rows of a channel by its motion and values."""
@@ -162,8 +173,8 @@ def _axis(
         return found
     train = [k for k, r in enumerate(usable) if r.name not in holdout]
     test = [k for k, r in enumerate(usable) if r.name in holdout]
-    task = AxisTask(usable=usable, train=train, test=test, without=without, around=around)
-    found = _motor(replace(found, wide=encoder_width(usable, train)), task)
+    task = AxisTask(name=name, usable=usable, train=train, test=test, without=without, around=around)
+    found = _motor(replace(found, wide=encoder_width(usable, train, task.bodies)), task)
     if any(usable[k].load is not None for k in train):
         _study_second_encoder(found, task)
     _name_rest(found)
@@ -175,27 +186,23 @@ def _axis(
 
 
 def _motor(blank: AxisFindings, task: AxisTask) -> AxisFindings:
-    """Findings on following error and drive force.
-
-    The drive force shows rows of which the following error does not show the loop, those of a disturbance force, and
-    friction that differs between the directions. Both are fitted again with them.
+    """Findings on following error and drive force; again with friction that differs between the directions, which deflects
+    the loop, where the drive force shows it.
     """
-    pushed, asymmetric = list[tuple[str, float, float]](), False
+    asymmetric = False
     for again in (False, True):
         found = replace(blank, causes=[], imitated={}, unknown_in=[], details={})
-        late = _study_following(found, task, pushed, asymmetric)
+        late = _study_following(found, task, asymmetric)
         _study_force(found, task, late)
-        pushed, asymmetric = found.pushed, any(ASYMMETRY.intersection(c.parameters) for c in found.causes)
-        if again or found.following is None or not (pushed or asymmetric):
+        asymmetric = any(ASYMMETRY.intersection(c.parameters) for c in found.causes)
+        if again or found.following is None or not asymmetric:
             break
     return found
 
 
-def _study_following(
-    found: AxisFindings, task: AxisTask, pushed: Sequence[tuple[str, float, float]], asymmetric: bool
-) -> float | None:
+def _study_following(found: AxisFindings, task: AxisTask, asymmetric: bool) -> float | None:
     """The following error; how late the axis is on average, s, None where that does not show."""
-    every, train = [r.unpushed(pushed) for r in task.usable], task.train
+    every, train = task.usable, task.train
     gaps = [r.gap for r in every]
     if not train or not all(np.isfinite(gaps[k]).all() for k in train):
         return None
@@ -223,7 +230,8 @@ def _study_force(found: AxisFindings, task: AxisTask, late: float | None) -> Non
         c.effect == "servo_overshoot" for c in found.causes
     )  # set-points a while later are no motion of such a loop
     followed = found.following.followed(task.usable) if found.following and swings else None
-    runs, moves, values = motion_of(found, task.usable, forces, task.train, late, followed=followed)
+    every, train = task.usable, task.train
+    runs, moves, values = motion_of(found, every, forces, train, late, followed=followed, bodies=task.bodies)
     on = [run.moved() for run in runs]
     moves = [m.of(rows) for m, rows in zip(moves, on, strict=True)]
     values = [own[rows] for own, rows in zip(values, on, strict=True)]

@@ -1,4 +1,4 @@
-"""The machine around an axis: loads on its drive, columns of weight, motion of other axes, and dx = J(q) e at the tip."""
+"""The machine around an axis: loads on its drive, columns of the bodies behind it, motion of other axes, and dx = J(q) e at the tip."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ import numpy as np
 from camcomp.diagnosis.axis.at_tip import Errors, lever_mm
 from camcomp.diagnosis.axis.effect_columns import DrivenAxis
 from camcomp.diagnosis.axis.findings import ROWS, AxisRun
+from camcomp.diagnosis.axis.rigid_bodies import torque_columns
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.arm import Arm, arm_of, end_pose, jacobian
-from camcomp.model.statics.description import Actuator, Robot, Transform
+from camcomp.model.statics.description import Actuator, Robot
 from camcomp.model.statics.hanging import hang
 from camcomp.model.statics.masses import has_moved_mass, mass_loads
-from camcomp.model.statics.rotation import rotations_of
 
-LEAST_ARM = 1e-3  # of a direction, or of an arm of 1 m: by which a weight has to change with the pose
 POSES = 400  # of a run at which the rates of the machine are worked out; between them they are straight
 
 
@@ -59,31 +58,24 @@ class AxisSurroundings:
                 out.append(np.interp(time, own.time[known], own.encoder[known]) / lever_mm(own.revolute))
         return np.stack(out, axis=1)
 
-    def weights(self, name: str, run: AxisRun) -> Floats:
-        """Columns (n, w): torque of the first moments of a joint's link, and of a weight at the end of the arm, per N mm and N."""
+    def bodies(self, name: str, run: AxisRun, moved: AxisTravel, wide: int) -> tuple[Floats, Floats]:
+        """Columns (n, c) of the torque of a hinge in what lies behind it, and their part that is weight; on a machine that is no
+        arm sine and cosine of the angle.
+        """
         arm = None if self.robot is None else arm_of(self.robot)
         if arm is None or self.robot is None:
-            angle = run.encoder / lever_mm(True)
-            return np.stack([np.sin(angle), np.cos(angle)], axis=1)
-        q, start = self.coordinates(run.name, run.time), self.index(name)
-        rotation, point, j = np.broadcast_to(arm.chain.frame, (len(q), 3, 3)), np.zeros((len(q), 3)), 0
-        axis, about, link = np.zeros((len(q), 3)), point, rotation
-        for e in arm.chain.elements:
-            if isinstance(e, Transform):
-                point, rotation = point + rotation @ e.translation, rotation @ e.rotation
-            elif isinstance(e, Actuator):
-                along = rotation @ e.axis
-                if e.revolute:
-                    rotation = rotation @ rotations_of(q[:, j, None] * e.axis)
-                else:
-                    point = point + q[:, j, None] * along
-                if j == start:
-                    axis, about, link = along, point, rotation
-                j += 1
-        arms = [*(link[:, :, i] for i in range(3)), (point - about) / lever_mm(True)]
-        columns = [np.einsum("ni,ni->n", axis, np.cross(each, (0.0, 0.0, -1.0))) for each in arms]
-        moving = [each for each in columns if np.ptp(each) > LEAST_ARM]
-        return np.stack(moving, axis=1) if moving else np.zeros((len(q), 0))
+            angle = moved.position / lever_mm(True)
+            weight = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+            return weight, weight
+        q = self.coordinates(run.name, moved.time)
+        speed, acceleration = np.zeros_like(q), np.zeros_like(q)
+        for other, own in (self.others(name, run, wide) | {name: moved}).items():
+            j, lever = self.index(other), lever_mm(self.robot.actuators[self.index(other)].revolute)
+            speed[:, j] = np.interp(moved.time, own.time, own.speed) / lever
+            acceleration[:, j] = np.interp(moved.time, own.time, own.acceleration) / lever
+        at = self.index(name)
+        still = np.zeros_like(q)
+        return torque_columns(arm.chain, at, q, speed, acceleration), torque_columns(arm.chain, at, q, still, still)
 
     def others(self, name: str, run: AxisRun, wide: int) -> dict[str, AxisTravel]:
         """How the other axes moved in the same run."""
