@@ -87,7 +87,7 @@ class ChannelData:
 
 
 def base_of(columns: Sequence[Floats]) -> Floats:
-    """Combinations (c, b) of columns (n, c) per run that tell them apart, each column at its usual size.
+    """Independent combinations (c, b) of columns (n, c) per run, each column at its usual size.
 
     Gautier, Khalil, IEEE Trans. Robotics and Automation 6 (1990): only these combinations of inertial parameters show.
     """

@@ -318,7 +318,7 @@ def _push(name: str, window: Window, rows: JointRows) -> AxisCause:
 
 
 def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, data: ChannelData) -> None:
-    """Sizes that every axis has, for the reader, in the units of the axis; none where the rows do not determine them."""
+    """Sizes that every axis has, for the reader, in the units of the axis, where the rows determine them."""
     if not np.isfinite(done.covariance).all():
         return
     lever = lever_mm(rows.runs[0].revolute)

@@ -149,7 +149,7 @@ class AxisTask:
 
     @cached_property
     def bodies(self) -> list[Floats] | None:
-        """Columns (n, b) of the bodies behind the axis in the drive force, per run; None where they do not change it."""
+        """Columns (n, b) of the bodies behind a joint in its torque, per run. None for a slide, and without torques."""
         if not self.train or not any(r.revolute and np.isfinite(r.force).all() for r in self.usable):
             return None
         every = [self.around.bodies(self.name, r, travel(r.time, r.encoder), WIDE[0])[0] for r in self.usable]

@@ -59,8 +59,8 @@ class AxisSurroundings:
         return np.stack(out, axis=1)
 
     def bodies(self, name: str, run: AxisRun, moved: AxisTravel, wide: int) -> tuple[Floats, Floats]:
-        """Columns (n, c) of the torque of a hinge in what lies behind it, and their part that is weight; on a machine that is no
-        arm sine and cosine of the angle.
+        """Columns (n, c) of the bodies behind a hinge in its torque, and their part that is weight. On a machine that is no arm
+        both are sine and cosine of the angle.
         """
         arm = None if self.robot is None else arm_of(self.robot)
         if arm is None or self.robot is None:

@@ -457,9 +457,15 @@ def test_numbers_that_may_not_be_the_joints_are_not_guessed(read):
     head[1:8] = [f"q_{k}" for k in range(6)]
     twice = read(",".join([*head, *(f"pos_{k}" for k in range(6))]) + "\n" + ",".join("0" for _ in range(25)) + "\n")
     assert twice.code == 2 and "it could be q_0, pos_0" in twice.told
-    forces = [f"tau_{k}" for k in range(6)]
-    plain = read(",".join([*head[:7], *forces, "x", "y", "z"]) + "\n" + ",".join("1" for _ in range(16)) + "\n")
-    assert "tau_0 to tau_5 left out, they state no unit: tau_0_Nm would be one" in plain.told
-    named = ",".join([*head[:7], *(f"{each}_Nm" for each in forces), "x", "y", "z"])
-    taken = read(named + "\n" + ",".join("1" for _ in range(16)) + "\n", name="b.csv")
-    assert "tau_0_Nm to tau_5_Nm are taken as act_shoulder_pan_Nmm to act_wrist_3_Nmm" in taken.told
+
+
+@pytest.mark.parametrize(
+    ("unit", "due"),
+    [
+        ("", "tau_0 to tau_5 left out, they state no unit: tau_0_Nm would be one"),
+        ("_Nm", "tau_0_Nm to tau_5_Nm are taken as act_shoulder_pan_Nmm to act_wrist_3_Nmm"),
+    ],
+)
+def test_torques_that_are_counted_need_their_unit(read, unit, due):
+    head = [*(f"q_{k}" for k in range(6)), *(f"tau_{k}{unit}" for k in range(6)), "x", "y", "z"]
+    assert due in read(",".join(head) + "\n" + ",".join("1" for _ in head) + "\n").told
