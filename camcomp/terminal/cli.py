@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from threading import Timer, main_thread
 from types import FrameType
-from typing import Any
+from typing import Any, TextIO
 
 import click
 
@@ -137,10 +137,11 @@ def main(args: list[str] | None = None) -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # saves a search through all installed packages
     _end_on_signals()
     code = run(sys.argv[1:] if args is None else args)
-    try:
-        sys.stdout.flush()
-    except OSError:
-        _forget_output()  # the error was reported when it occurred
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            _forget(stream)  # the error was reported when it occurred, or cannot be
     gc.freeze()  # saves a last garbage collection at exit
     sys.exit(code)
 
@@ -173,7 +174,7 @@ def run(args: list[str]) -> int:
         _tell("camcomp: terminated")
         return 128 + end.number
     except BrokenPipeError:
-        _forget_output()
+        _forget(sys.stdout)
         return 141
     except OSError as error:
         name = f"{error.filename}: " if error.filename else ""
@@ -215,9 +216,9 @@ def _short_of_memory() -> bool:
     return False
 
 
-def _forget_output() -> None:
-    """Redirect standard output to the null device, because Python flushes it once more at exit."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def _forget(stream: TextIO) -> None:
+    """Redirect a standard stream to the null device, because Python flushes it once more at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 @contextmanager

@@ -201,7 +201,7 @@ def test_messages_that_cannot_be_written_change_no_exit_code(folder, words, code
         done = subprocess.run(
             [sys.executable, "-m", "camcomp", *words],
             stderr=full,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": ""},  # it hides errors of the last flush
             check=False,
         )
     assert done.returncode == code
