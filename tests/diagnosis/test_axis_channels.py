@@ -170,13 +170,16 @@ LINKS = 0.5, 0.25, 8.0, 0.2, 5.0, 0.3, 0.1  # m, m, kg, m, kg, kg m2, kg m2: fir
 RUBS = np.array([[9.0, 6.0], [4.0, 2.5]])  # N m, N m s/rad of both joints
 
 
-def two_link_log(folder, name, seed):
-    """Set-points as followed, and torques by Siciliano et al., Robotics, 7.3.2, with friction that turns within 5 mrad/s."""
+def two_link_log(folder, name, seed, moves=1.0):
+    """Encoders, and torques by Siciliano et al., Robotics, 7.3.2, with friction that turns within 5 mrad/s.
+
+    moves: stretches the course of both joints; at 0 they stand still.
+    """
     a1, l1, m1, l2, m2, i1, i2 = LINKS
     g, rng = 9.80665, np.random.default_rng(seed)
-    t, q1, v1, w1 = course(seed)
-    _, q2, v2, w2 = course(seed + 20)
-    q2, v2, w2 = 2.0 * q2, 2.0 * v2, 2.0 * w2
+    (t, *first), (_, *second) = course(seed), course(seed + 20)
+    q1, v1, w1 = moves * np.array(first)
+    q2, v2, w2 = 2.0 * moves * np.array(second)
     c2, s2 = np.cos(q2), np.sin(q2)
     both = m2 * (l2**2 + a1 * l2 * c2) + i2
     torques = [
@@ -205,3 +208,12 @@ def test_joints_that_move_together_do_not_bend_each_others_friction(tmp_path):
         for name, true in zip(("force_Nmm", "viscous_Nmms_per_rad"), 1e3 * RUBS[k], strict=True):
             low, high = friction.parameters[name].ci95
             assert low <= true <= high and high - low < 0.2 * true
+
+
+def test_an_arm_with_stated_masses_may_stand_still_in_a_run(tmp_path):
+    stated = TWO_LINKS.replace("J1, ", "J1, mass_kg: 8, centre_mm: [250, 0, 0], ").replace("J2, ", "J2, mass_kg: 5, centre_mm: [200, 0, 0], ")  # fmt: skip
+    (tmp_path / "arm.yaml").write_text(stated)
+    for name, seed, moves in (("a", 1, 1.0), ("b", 5, 1.0), ("c", 9, 0.0)):
+        two_link_log(tmp_path, name, seed, moves)
+    result = asked(tmp_path, ["arm.yaml"], "abc", holdout=["b"])
+    assert {c.target for c in result.causes if c.effect == "friction"} == {"J1", "J2"}

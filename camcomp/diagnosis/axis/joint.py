@@ -239,7 +239,8 @@ def _healthy(
         out.append(own)
         inertia.append(moved)
     common = set.intersection(*(set(each) for each in out))
-    return [{kind: own[kind] for kind in own if kind in common} for own in out], inertia
+    healthy, moving = ([{kind: own[kind] for kind in own if kind in common} for own in each] for each in (out, inertia))
+    return healthy, moving
 
 
 def _turning(m: AxisTravel) -> Floats:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -37,10 +38,9 @@ def tasks(count, text=GOOD):
         )
 
 
-def deadly(task):
+def deadly(task, mark, always):
     """Stands in for the real work: the process that gets task 2 the first time dies."""
-    mark = Path(os.environ["CAMCOMP_TEST_MARK"])
-    if task.key in ("key-2", os.environ.get("CAMCOMP_TEST_ALWAYS")):
+    if task.key in ("key-2", always):
         try:
             mark.touch(exist_ok=task.key != "key-2")
             os.kill(os.getpid(), signal.SIGKILL)
@@ -52,9 +52,7 @@ def deadly(task):
 
 @pytest.mark.parametrize("always", ["", pytest.param("key-5", marks=pytest.mark.campaign)])
 def test_a_worker_killed_on_this_machine_loses_nothing(monkeypatch, tmp_path, always):
-    monkeypatch.setenv("CAMCOMP_TEST_MARK", str(tmp_path / "died"))
-    monkeypatch.setenv("CAMCOMP_TEST_ALWAYS", always)
-    monkeypatch.setattr(pools, "work", deadly)
+    monkeypatch.setattr(pools, "work", partial(deadly, mark=tmp_path / "died", always=always))
     seen = {each.key: each.exit_code for each in pools.on_this_machine(tasks(12), 2)}
     assert seen == {f"key-{i}": pools.BUG if f"key-{i}" == always else 0 for i in range(12)}
     assert (tmp_path / "died").exists()
