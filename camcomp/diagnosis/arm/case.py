@@ -62,6 +62,11 @@ class PoseCase:
         return self.every_gap[: len(self.bench.own)]
 
     @property
+    def runs(self) -> list[str]:
+        """Names of the fitted runs."""
+        return list(dict.fromkeys(str(name) for k in self.bench.own for name in self.bench.campaigns[k].run))
+
+    @property
     def model(self) -> LinearModel:
         """The linear model at the fitted causes."""
         return self.explanation.model

@@ -30,6 +30,7 @@ _SHARE_OF_SCALE = 0.05  # step of a difference
 _SAME_STEP = 1e-6  # times in equal steps of 1 are row numbers
 _JOINT_STEP = 1e-5  # rad or mm
 CURVE = "joint_curve"
+LEAST_POSES = 4  # of a campaign, with three values each: its frame and target have nine unknowns
 EffectShape = tuple[
     tuple[str, float, float, float], ...
 ]  # what shapes an effect: name, value, and between which values it lies

@@ -18,10 +18,10 @@ from camcomp.diagnosis.arm.linear import Shelf, linearise
 from camcomp.diagnosis.arm.next_poses import next_poses
 from camcomp.diagnosis.arm.noise_floor import TipFloor, far_off, least_floor, resolution, tip_floor
 from camcomp.diagnosis.arm.pose_values import of_poses
-from camcomp.diagnosis.arm.poses import ArmBench, Poses, combined
+from camcomp.diagnosis.arm.poses import LEAST_POSES, ArmBench, Poses, combined
 from camcomp.diagnosis.arm.temporary_offsets import EFFECT as SPELL
 from camcomp.diagnosis.arm.temporary_offsets import temporary_offsets
-from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrinkage, without_far_judged
+from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrinkage, unseen_poses, without_far_judged
 from camcomp.diagnosis.model.discrepancy import residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.explain import Explanation, KnownNoise, explain
@@ -36,7 +36,6 @@ from camcomp.model.statics.description import Robot
 from camcomp.model.statics.masses import has_moved_mass
 
 MOST_POSES = 1200  # of a campaign; more are drawn from
-LEAST_POSES = 12  # of a campaign; fewer do not even tell its frames
 CAMPAIGN_SEED = 20200714  # drawing has to give the same answer twice
 PASSES = 2  # of linearising about what was found
 MANY = 4  # causes from which on a joint that was shifted for a while is looked for
@@ -278,7 +277,8 @@ def studied(
         )  # fmt: skip
     bench = case.bench
     case = without_far_judged(case)
-    case = replace(case, check=check_held_out(case))
+    unseen = unseen_poses(case)
+    case = replace(case, check=check_held_out(case, unseen))
     progress.done(0.8)
     named, minor = answer.causes(case)
     word = answer.verdict(case, named)
@@ -293,7 +293,7 @@ def studied(
     result = DiagnosisResult(
         verdict=word, gap=answer.gap(case.gaps, floor), where=answer.where(case, word), causes=named,
         alternatives=alternatives if word == "ambiguous" or len(alternatives) > 1 else (),
-        shrinkage=shrinkage(case, named, sorted(names), bool(holdout)), minor=minor,
+        shrinkage=shrinkage(case, unseen, named, sorted(names), bool(holdout)), minor=minor,
         next_experiment=next_poses(case, word),
         floor=Floor(um=round(floor.um, 3), source=floor.source) if floor else Floor(um=None, source="not identifiable"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(set(case.outliers))),

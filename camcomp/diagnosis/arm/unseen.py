@@ -1,13 +1,13 @@
 """Static poses that took no part in the fit: whether they are at the floor, and how far their gap shrinks.
 
-Withheld campaigns are judged by the fitted ones, else every campaign by the others; one campaign alone has no unseen poses.
-A withheld campaign with the clamping of a fitted one has its frames; one with a clamping of its own has them fitted again.
+Withheld campaigns are judged by the fitted ones, else every run by the others; a run that is alone has no unseen poses. What
+is judged has the frames of its clamping where fitted poses fix them; otherwise its frames are fitted again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,27 +15,48 @@ from camcomp.diagnosis.answer.unseen import PARTS, JudgedRun, unseen_shrinkage
 from camcomp.diagnosis.arm.case import PoseCase, named_rows
 from camcomp.diagnosis.arm.curves import covered, seen_angles
 from camcomp.diagnosis.arm.noise_floor import far_off
-from camcomp.diagnosis.arm.poses import CURVE, ArmBench
-from camcomp.diagnosis.model.evidence import Background
-from camcomp.diagnosis.model.folds import Excess, excess_of, folds_of, held_out, without_nuisances
-from camcomp.diagnosis.model.group import split_regions
+from camcomp.diagnosis.arm.poses import CURVE, LEAST_POSES, ArmBench
+from camcomp.diagnosis.model.evidence import Background, LinearModel
+from camcomp.diagnosis.model.folds import Excess, excess_of, folds_of, held_out
+from camcomp.diagnosis.model.group import Group, split_regions
 from camcomp.diagnosis.model.search import MOST, search_sets
 from camcomp.diagnosis.result.types import FoundCause, UnknownCause, UnseenShrinkage
 from camcomp.ground import shelf
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.effect import Cause
 
 FAR_FRAME = 5.0  # contract: floors from which on withheld poses in fitted frames are warned of
 
 
-def check_held_out(case: PoseCase) -> Excess | None:
-    """Excess of held-out campaigns with the causes, under the noise of the floor alone; None without either of them."""
-    if len(case.bench.campaigns) < 2 or case.floor is None:
+@dataclass(frozen=True, eq=False)
+class UnseenPoses:
+    """The model with one group per unit that is left out; of every such unit the campaign and its rows."""
+
+    model: LinearModel
+    units: list[tuple[int, Ints]]
+
+
+def unseen_poses(case: PoseCase) -> UnseenPoses:
+    """Withheld campaigns, else all runs."""
+    bench, groups = case.bench, case.model.groups
+    if len(bench.own) < len(bench.campaigns):
+        judged = range(len(bench.own), len(bench.campaigns))
+        return UnseenPoses(case.model, [(k, np.arange(len(groups[k].y))) for k in judged])
+    units = []
+    for k, poses in enumerate(bench.campaigns):
+        names = np.unique(poses.run, return_inverse=True)[1]
+        units += [(k, np.flatnonzero(names == i)) for i in np.unique(names)]
+    return UnseenPoses(replace(case.model, groups=tuple(groups[k].take(rows) for k, rows in units), fitted=None), units)
+
+
+def check_held_out(case: PoseCase, unseen: UnseenPoses) -> Excess | None:
+    """Excess of held-out poses with the causes, under the noise of the floor alone; None without either of them."""
+    pairs = folds_of(unseen.model)
+    if case.floor is None or not all(others for _, others in pairs):
         return None
     found = case.explanation
     background = Background(families=found.background.families)
-    parts = held_out(case.model, background, found.members, folds_of(case.model))
-    return excess_of(case.model, parts, case.floor.freedom)
+    return excess_of(unseen.model, held_out(unseen.model, background, found.members, pairs), case.floor.freedom)
 
 
 def without_far_judged(case: PoseCase) -> PoseCase:
@@ -85,28 +106,25 @@ def notes_of_frames(case: PoseCase, named: Sequence[FoundCause]) -> tuple[str, .
 
 
 def shrinkage(
-    case: PoseCase, named: Sequence[FoundCause], names: Sequence[str], withheld: bool
+    case: PoseCase, unseen: UnseenPoses, named: Sequence[FoundCause], names: Sequence[str], withheld: bool
 ) -> UnseenShrinkage | None:
-    """Shrinkage of withheld campaigns by causes that were fitted to the others; None where all campaigns are fitted."""
+    """Shrinkage of withheld campaigns, else of every run by causes fitted to the others; None where one run is all."""
     bench = case.bench
     known = [c for c in named if not isinstance(c, UnknownCause)]
-    if withheld:
-        judged = tuple(range(len(bench.own), len(bench.campaigns)))
-        stages = [[bench.gap(k, acting(known[:i])) for i in range(len(known) + 1)] for k in judged]
-        order = [(c.effect, c.target) for c in known]
-    else:
-        judged = bench.own if len(bench.own) > 1 else ()
-        stages, order = left_out_in_turn(case)
-    if not judged:
+    if not unseen.units or (not withheld and len(case.runs) == 1):
         return None
+    if withheld:
+        stages = [[bench.gap(k, acting(known[:i])) for i in range(len(known) + 1)] for k, _ in unseen.units]
+        order = [(c.effect, c.target) for c in known]
+        refitted = any(bench.owner[k] == k for k, _ in unseen.units)
+    else:
+        stages, order, refitted = left_out_in_turn(unseen.model, case.explanation.background)
     runs = []
-    for k, each in zip(judged, stages, strict=True):
-        count = min(PARTS, max(len(each[0]) // 8, 2))
-        parts = split_regions(bench.campaigns[k].features, count)
+    for (k, rows), each in zip(unseen.units, stages, strict=True):
+        parts = split_regions(bench.campaigns[k].features[rows], min(PARTS, max(len(rows) // 8, 2)))
         runs.append(JudgedRun([(r**2).sum(axis=1) for r in each], parts))
-    share, rest = where_covered(case, named, judged, [r.squares[-1] for r in runs])
-    refitted = [k for k in judged if bench.owner[k] == k]
-    texts = [] if not refitted else ["frame of the instrument", "place of its target"]
+    share, rest = where_covered(case, named, unseen.units, [r.squares[-1] for r in runs])
+    texts = ["frame of the instrument", "place of its target"] if refitted else []
     texts += [f"run {name} does not fix its frame: not judged" for name in case.loose]
     return unseen_shrinkage(
         runs, order, holdout=tuple(names), noise_floor_um=None if case.floor is None else round(case.floor.um, 3),
@@ -114,42 +132,62 @@ def shrinkage(
     )  # fmt: skip
 
 
-def left_out_in_turn(case: PoseCase) -> tuple[list[list[Floats]], list[tuple[str, str | None]]]:
-    """Residuals (n, 3) of every campaign after 0, 1, ... causes that the others have, and the causes in order."""
-    model, background, candidates = case.model, case.explanation.background, case.model.candidates
+def left_out_in_turn(
+    model: LinearModel, background: Background
+) -> tuple[list[list[Floats]], list[tuple[str, str | None]], bool]:
+    """Residuals (n, 3) of every group after 0, 1, ... causes that the others have, the causes in order, and whether a
+    group had its frames fitted again.
+    """
     order: list[tuple[str, str | None]] = []
     every: list[list[Floats]] = []
-    for g, others in folds_of(model) if len(case.bench.own) > 1 else ():
+    refitted = False
+    for g, others in folds_of(model):
         less = replace(model, fitted=others)
         members = search_sets(less.reduced(background), MOST).best
         at = less.posterior(background, less.reduced(background).slab(members))
-        own = {candidates[i].place: list(candidates[i].columns) for i in members}
+        own = {model.candidates[i].place: list(model.candidates[i].columns) for i in members}
         own |= {(name, None): less.family(name)[0].tolist() for name, _ in background.families}
         order += [place for place in own if place not in order]
-        group = model.groups[g]
-        left, stages = group.y, [without_nuisances(group.y, group.N)]
-        for place in order:
-            on = own.get(place, [])
-            left = left - group.A[:, :, on] @ at.mean[on]
-            stages.append(without_nuisances(left, group.N))
+        mates = [model.groups[i] for i in others if model.groups[i].label == model.groups[g].label]
+        alone = not fix_frames(mates, model.groups[g])
+        refitted |= alone
+        stages = []
+        for i in range(len(order) + 1):
+            on = [j for place in order[:i] for j in own.get(place, [])]
+            stages.append(in_frames(model.groups[g], [model.groups[g]] if alone else mates, on, at.mean[on]))
         every.append(stages)
-    return [[*each, *each[-1:] * (len(order) + 1 - len(each))] for each in every], order
+    return [[*each, *each[-1:] * (len(order) + 1 - len(each))] for each in every], order, refitted
+
+
+def fix_frames(others: Sequence[Group], group: Group) -> bool:
+    """Whether frames fitted to other groups of a clamping err less than a pose of the group does by itself."""
+    if sum(len(each.y) for each in others) < LEAST_POSES:
+        return False
+    fitted = np.concatenate([each.N for each in others]).reshape(-1, group.N.shape[2])
+    moved = group.N.reshape(-1, group.N.shape[2]) @ np.linalg.pinv(fitted)
+    return float((moved**2).sum()) < group.y.size
+
+
+def in_frames(group: Group, fixed_by: Sequence[Group], on: Sequence[int], amount: Floats) -> Floats:
+    """Residual (n, 3) of a group with columns at their amounts, in the frames that fit best to other groups of its label."""
+    y, A, N = (np.concatenate([getattr(g, name) for g in fixed_by]) for name in ("y", "A", "N"))
+    frame = np.linalg.lstsq(N.reshape(-1, N.shape[2]), (y - A[:, :, on] @ amount).ravel(), rcond=1e-10)[0]
+    return np.asarray(group.y - group.A[:, :, on] @ amount - group.N @ frame, float)
 
 
 def where_covered(
-    case: PoseCase, named: Sequence[FoundCause], judged: Sequence[int], after: Sequence[Floats]
+    case: PoseCase, named: Sequence[FoundCause], units: Sequence[tuple[int, Ints]], after: Sequence[Floats]
 ) -> tuple[float | None, float | None]:
-    """Share of withheld poses whose joints with an error curve lie in its measured range, and the rms residual there,
-    um.
-    """
+    """Share of unseen poses whose joints with an error curve lie in its measured range, and the rms residual there, um."""
     bench = case.bench
     joints = sorted({bench.actuators.index(str(c.target)) for c in named if c.effect == CURVE})
     if not joints:
         return None, None
     inside = []
-    for k in judged:
-        q = np.concatenate([bench.campaigns[i].q for i in bench.own if i != k])
-        inside.append(covered({a: seen_angles(q[:, a]) for a in joints}, bench.campaigns[k].q))
+    for k, rows in units:
+        others = [np.delete(bench.campaigns[i].q, rows, axis=0) if i == k else bench.campaigns[i].q for i in bench.own]
+        q = np.concatenate(others)
+        inside.append(covered({a: seen_angles(q[:, a]) for a in joints}, bench.campaigns[k].q[rows]))
     every = np.concatenate([left[mask] for left, mask in zip(after, inside, strict=True)])
     rest = round(1e3 * float(np.sqrt(every.mean())), 3) if len(every) else None
     return round(len(every) / sum(len(left) for left in after), 4), rest

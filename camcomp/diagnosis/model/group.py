@@ -157,7 +157,10 @@ def normal_equations(
 
 def sum_grams(grams: Sequence[NormalEquations]) -> NormalEquations:
     """Normal equations of several groups together."""
-    A, b = np.sum([g.A for g in grams], axis=0), np.sum([g.b for g in grams], axis=0)
+    A, b = grams[0].A.copy(), grams[0].b.copy()
+    for g in grams[1:]:  # in place: a stack of many groups would be large
+        A += g.A
+        b += g.b
     return NormalEquations(A, b, sum(g.c for g in grams), sum(g.rows for g in grams), sum(g.log_size for g in grams))
 
 
