@@ -89,7 +89,7 @@ def test_arcs_come_out_as_arcs_where_the_control_is_better_off(orthoglide, mode)
 def test_lines_stay_where_the_mode_is_only_assumed(orthoglide):
     assumed = compensated(orthoglide, circle(25.0, 3000))
     assert not assumed.control.stated and not (assumed.rows.kind == ARC).any()
-    assert not any("the controller drives" in each for each in assumed.warnings)
+    assert not any("the controller drives" in each for each in Totals.of(assumed, orthoglide).warnings)
 
 
 def test_lines_stay_where_the_control_leaves_them_within_the_tolerance(orthoglide):
@@ -112,7 +112,7 @@ def test_lines_are_kept_from_being_made_one(orthoglide, mode):
     apart = mode.partition(" Q")[0] + " Q0"
     text = done.written.data.decode().splitlines()
     assert done.control.apart and done.control.off_joins < 2e-3
-    assert any(each.startswith(f"{apart} is written around the cuts") for each in done.warnings)
+    assert any(each.startswith(f"{apart} is written around the cuts") for each in Totals.of(done, orthoglide).warnings)
     assert apart in text[text.index(mode, 5) :] and apart in text[: text.index(mode, 5)]
     read = read_program(done.written.data, name="out.nc", setup=setup_of(orthoglide.config))
     cuts = np.flatnonzero(done.rows.force.any(axis=1) & (done.rows.motion != done.rows.motion[0]))
@@ -148,11 +148,11 @@ def test_where_the_control_goes_off_is_told_with_its_lines(orthoglide):
     done = compensated(
         orthoglide, ["G0 X0 Y0 Z5", "G1 Z0 F400", "X9 Y0 F3000", "X18 Y0.5", "X27 Y0", "G1 Z5"], "G64 P0.01"
     )
-    told = [each for each in done.warnings if "the controller drives" in each]
+    told = [each for each in Totals.of(done, orthoglide).warnings if "the controller drives" in each]
     assert told and all(each.startswith("in G64 P0.01 the controller drives up to ") for each in told)
     assert "at source line 6;" in told[-1]  # whose corners are rounded
     exact = compensated(orthoglide, rectangle(3000), "G61")
-    assert not any("the controller drives" in each for each in exact.warnings)
+    assert not any("the controller drives" in each for each in Totals.of(exact, orthoglide).warnings)
 
 
 @pytest.mark.parametrize("mode", ["G61", "G64", "G64 P0.01"])
@@ -181,7 +181,7 @@ def test_the_control_rests_between_cuts_and_joining_lines(orthoglide):
     text = done.written.data.decode().splitlines()
     assert [each for each in text if each.startswith("G6")] == ["G64", "G61", "G64", "G61", "G64"]
     assert done.control.resting == 4 and done.control.at_joins <= 1e-3
-    assert any(each.startswith("G61 is written at 4 ends") for each in done.warnings)
+    assert any(each.startswith("G61 is written at 4 ends") for each in Totals.of(done, orthoglide).warnings)
     read = read_program(done.written.data, name="out.nc", setup=setup_of(orthoglide.config))
     rests = np.flatnonzero([mode.exact for mode in read.modes])
     joins = np.flatnonzero(done.rows.joining)

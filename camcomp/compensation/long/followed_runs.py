@@ -18,17 +18,15 @@ from camcomp.model.stock.follow import refuse_untouched
 from camcomp.model.stock.from_config import Bounds, memory_of
 from camcomp.model.stock.memory import StockMemory
 from camcomp.model.stock.tool_frame import tool_frame_of
-from camcomp.model.stock.warnings import Remarks, stock_remarks, stock_warnings
 
 
 @dataclass(eq=False)
 class FollowedRuns:
-    """The stock of a long program, and the remarks on it."""
+    """The stock of a long program."""
 
     job: Job
     name: str
     memory: StockMemory
-    remarks: Remarks
 
     @classmethod
     def of(cls, job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRuns | None:
@@ -48,7 +46,7 @@ class FollowedRuns:
                 elif isinstance(run, InterpretedRun) and run.motions:
                     bounds.add(runs.program(run).path)
             source.seek(0)
-        return cls(job, name, memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds), {})
+        return cls(job, name, memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds))
 
     def follow(self, path: Path, ahead: Path | None) -> tuple[Engaged, Engaged]:
         """Engagement on the motions of a run, and at the begin of those after it (`ahead`).
@@ -60,12 +58,8 @@ class FollowedRuns:
         text = "the rapid goes through material of the stock"
         lines = np.unique(path.line[crashes]).tolist()
         raise_all([ProgramError("CC142", f"line {n}: {text}", at=Location(self.name, n, 1)) for n in lines[:20]])
-        own = found.of_motions(0, len(path))
-        for key, seen in stock_remarks(self.job.config, path, own).items():
-            self.remarks[key] = np.union1d(self.remarks.get(key, seen[:0]), seen)
-        return own, found.of_motions(len(path), len(both))
+        return found.of_motions(0, len(path)), found.of_motions(len(path), len(both))
 
-    def finish(self) -> list[str]:
-        """Warnings at the end. Raises ConfigError CC298 when nothing was cut."""
+    def finish(self) -> None:
+        """Raise ConfigError CC298 when nothing was cut."""
         refuse_untouched(self.job.config, self.memory)
-        return stock_warnings(self.remarks)

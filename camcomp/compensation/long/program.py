@@ -20,16 +20,16 @@ from camcomp.compensation.long.engagement import RunEngagement
 from camcomp.compensation.long.linear_run import LinearRun, NotInPieces
 from camcomp.compensation.long.proof import Sample
 from camcomp.compensation.long.runs import InterpretedRun, Runs
-from camcomp.compensation.long.totals import TotalsOfPieces
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.moves import minutes_of
-from camcomp.compensation.program.totals import JointTableRows
+from camcomp.compensation.program.totals import JointTableRows, Totals
 from camcomp.gcode.output import Part, Standing
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.program import Program
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.stamp import is_stamped, stamp_index, stamp_text
 from camcomp.gcode.text import Text
+from camcomp.gcode.uncorrected import UncorrectedFeeds
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID, Path
 from camcomp.ground.errors import CheckFailed
@@ -58,7 +58,7 @@ class LongProgram:
     arcs: bool | None = None
     on_rows: Callable[[JointTableRows], None] | None = None
 
-    def run(self, source: BinaryIO, sink: Callable[[bytes], object]) -> TotalsOfPieces:
+    def run(self, source: BinaryIO, sink: Callable[[bytes], object]) -> Totals:
         """Reads the seekable source twice: once for its hash. Raises NotInPieces before or in the middle of writing."""
         digest, size, lines, rest = hashlib.sha256(), 0, 0, b""
         while block := source.read(HASHED):
@@ -73,9 +73,9 @@ class LongProgram:
         self._output = Standing((x, y, z))
         self._told: Future[None] = Future()
         self._told.set_result(None)
-        self.totals = TotalsOfPieces(
-            self.job, self.name, tolerance_um=self.tolerance_um, tabled=self.on_rows is not None
-        )
+        self.totals = Totals(self.job, self.name, tolerance_um=self.tolerance_um, tabled=self.on_rows is not None)
+        self.totals.null = ("interpolation",)
+        self._feeds = UncorrectedFeeds(self.name)
         if self.job.conditions.model is not None and not self.job.conditions.steady:
             raise NotInPieces
         self._interpolated = with_answers(self.job)
@@ -91,8 +91,11 @@ class LongProgram:
                 self.totals.lines_out += data.count(b"\n")
                 sink(data)
             self._told.result()
-        totals = self.totals
-        totals.finish(self._runs, [] if self._stock is None else self._stock.finish())
+        totals, runs = self.totals, self._runs
+        if self._stock is not None:
+            self._stock.finish()
+        read = [*runs.warnings, *self._feeds.warnings(), *runs.behind_end]
+        totals.finish(runs.language, read, runs.waiting_s(self.job.config))
         totals.interpolated, iterations = self._sample.proof(self._interpolated)
         totals.iterations = max(totals.iterations, iterations)
         return totals
@@ -161,12 +164,13 @@ class LongProgram:
                 program, job, method="newton", tolerance_um=self.tolerance_um, version=self.version, part=part,
                 arcs=self.arcs, began_min=began, engaged=None if engaged is None else Engaged.joined(engaged.parts(0, first, len(program.path) - 1)),
             )  # fmt: skip
+        self._feeds.add(piece.path)
         own = slice(*np.searchsorted(result.rows.motion, (part.first, part.last)).tolist())
         assert result.written.behind is not None
         self._output = result.written.behind
 
         def tell() -> JointTableRows:
-            rows = self.totals.add_piece(result, own, part)
+            rows = self.totals.add(result, own, part)
             if job is not self.job:
                 self._sample.add(self.job, rows, result.rows.corrected[own])
             return rows

@@ -52,20 +52,17 @@ from camcomp.compensation.program.under_control import (
 from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
-from camcomp.gcode.uncorrected import below_step_warning
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.progress import part as part_of_work
 from camcomp.ground.vectors import sizes
-from camcomp.model.cutting.assumed import ForceDoubts
 from camcomp.model.cutting.engaged import Engaged
-from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
+from camcomp.model.cutting.spindle import cut_without_spindle
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import acting_force, aim_at
 from camcomp.model.signal_path import has_memory
 from camcomp.model.statics.target import Correction
-from camcomp.model.stock.warnings import stock_remarks, stock_warnings
 
 MAX_ROUNDS, ARC_ROUNDS = 6, 4
 STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
@@ -94,7 +91,10 @@ class Compensated:
     iterations: int
     method: str
     without_spindle: Ints  # source lines that cut while the spindle stands
-    warnings: list[str]
+    warnings: list[str]  # of what the correction has met
+    feeds: int  # corrected feed motions
+    moved: bool  # any of them leads elsewhere than programmed
+    engaged: Engaged | None  # what the tool meets along the path
     bands: Bands | None = None  # None: every number of the config is exact
     left: Floats | None = None  # (k, 3) mm of `after` that a policy leaves on purpose
     orienting: Orienting | None = None  # how the program states the orientation of the tool; None: it does not
@@ -393,9 +393,8 @@ class _Correction:
         if len(still):
             still = np.intersect1d(still, program.path.line[track.motion[self.feeding]])
         written, control = self._controlled(found)
-        warnings = [*program.warnings, *self._warnings(control, still)]
         line, nominal = program.path.line[rows.motion], before.state.rho_nominal
-        warnings += check_posture(program, job, line, job.frame.to_machine(rows.target), nominal)
+        warnings = self.turns.warning() + check_posture(program, job, line, job.frame.to_machine(rows.target), nominal)
         state = after.state
         if self.method != "linear" and rows.words is None:  # words of orientation say what the control makes of them
             state = whole_pose(job, points, found.commanded, rows.corrected, state)
@@ -405,6 +404,7 @@ class _Correction:
             force=acting_force(job, state.rho, points.travel, points.end), uncorrected=before.tip,
             before=before.error[judged], after=after.error[judged], control=control, judged=points.row[judged],
             iterations=self.aimed.iterations, method=self.method, without_spindle=still, warnings=warnings,
+            feeds=len(np.unique(track.motion[self.feeding])), moved=not self.kept[self.feeding].all(), engaged=track.engaged,
             bands=self._bands(found, before, written), left=None if found.left is None else found.left[judged],
             orienting=self.orienting, tilt_after=None if after.tilt is None else after.tilt[judged],
             fraction=track.u(rows.piece, rows.w),
@@ -425,20 +425,6 @@ class _Correction:
             if self.part is not None or other.better_than(control, self.tolerance_um):
                 return self._rewritten(rows, rest, apart), other
         return written, control
-
-    def _warnings(self, control: UnderControl, still: Ints) -> list[str]:
-        program, job, track = self.program, self.job, self.track
-        out = [*self.turns.warning(), *spindle_warning(still)]
-        if self.part is None:
-            out = warm_up_warnings(job) + control.warnings(program.language) + out
-            doubts = ForceDoubts(config=job.config)
-            doubts.add(program.path)
-            out += [*job.taken.remarks, *doubts.warnings()]
-            out += stock_warnings(stock_remarks(job.config, program.path, track.engaged))
-            if self.feeding.any() and self.kept[self.feeding].all():
-                feeds = len(np.unique(track.motion[self.feeding]))
-                out.append(below_step_warning(program.name, feeds, self.step))
-        return out
 
     def _bands(self, found: _Division, before: Seen, written: Rewritten) -> Bands | None:
         """Bands of the end points; None where every number of the config is exact."""
@@ -490,11 +476,3 @@ def _kept(track: Track, nodes: Nodes, correction: Floats, half: float) -> Bools:
     most = _largest(track, nodes, np.abs(correction).max(axis=1))
     out: Bools = (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
     return out
-
-
-def warm_up_warnings(job: Job) -> list[str]:
-    """Warnings of effects whose machine counts as warming up."""
-    if job.config.process.temperature_C is not None:
-        return []
-    warm = dict.fromkeys(cause.name for cause in job.causes if getattr(cause.effect, "WARMS", False))
-    return [f"{name}: without process: temperature_C the machine counts as warming up from 20 deg C" for name in warm]

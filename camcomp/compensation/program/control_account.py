@@ -109,7 +109,7 @@ class ControlAccount:
 
     def finish(self) -> None:
         """No more moves."""
-        if self._waiting:
+        if self._waiting > self._planned:
             self._plan(self._waiting)
 
     def _plan(self, until: int) -> None:

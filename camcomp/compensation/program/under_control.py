@@ -74,9 +74,14 @@ class UnderControl:
         return ControlAccount.of(self.written, self.limits, self.tolerance_mm, self.points)
 
     @cached_property
+    def original(self) -> ControlAccount:
+        """The account of the programmed moves."""
+        return ControlAccount.of(self.programmed, self.limits)
+
+    @property
     def before_s(self) -> float:
         """Execution time of the program."""
-        return ControlAccount.of(self.programmed, self.limits).seconds
+        return self.original.seconds
 
     @property
     def error(self) -> Floats:
@@ -116,14 +121,6 @@ class UnderControl:
         """Largest error apart from joining lines, mm."""
         size = sizes(self.error[~self.points.joined])
         return float(np.nanmax(size, initial=0.0))
-
-    def warnings(self, language: Dialect) -> list[str]:
-        """Warnings about the controller."""
-        apart = [mode for mode in self.modes if self.apart and merging(mode, language)]
-        return control_warnings(
-            self.modes, self.account.at_joins, self.account.elsewhere, exact_stop=language.exact_stop,
-            resting=self.resting, apart=apart,
-        )  # fmt: skip
 
     def leaves_room(self, tolerance_um: float) -> bool:
         """Whether another way to write the program might be faster or nearer to the path."""

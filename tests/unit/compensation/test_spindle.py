@@ -8,6 +8,7 @@ import pytest
 from camcomp.compensation.long import runs
 from camcomp.compensation.long.program import LongProgram
 from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.program.totals import Totals
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
@@ -46,7 +47,7 @@ def test_a_stopped_spindle_is_warned_of(monkeypatch, how, words, lines):
     monkeypatch.setattr(runs, "PROBE_MOTIONS", 4)
     job, text = job_of(), f"M3 S12000\n{HEAD}{words}\n{LINES}G0 Z5\nM30\n"
     if how == "short":
-        warnings = short(job, text).warnings
+        warnings = Totals.of(short(job, text), job).warnings
     elif how == "long":
         bulk = LongProgram(job=job, name="p.nc", setup=setup_of(job.config), tolerance_um=1.0, version="0")
         warnings = bulk.run(io.BytesIO(text.encode()), len).warnings
@@ -58,7 +59,7 @@ def test_a_stopped_spindle_is_warned_of(monkeypatch, how, words, lines):
 
 def test_air_needs_no_spindle():
     job = Job(load_config([shipped("config/cartesian.yaml"), shipped("config/no-force.yaml")]))
-    assert told(short(job, f"M5\n{HEAD}{LINES}M30\n").warnings) == []
+    assert told(Totals.of(short(job, f"M5\n{HEAD}{LINES}M30\n"), job).warnings) == []
 
 
 def test_the_sense_is_that_of_each_line():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.program.totals import Totals
 from camcomp.ground.errors import ConfigError, ProgramError
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
@@ -18,11 +19,12 @@ AGAIN = "G0 X-20 Y0\nG1 Z-2\nG1 X20\nG0 Z5\n"
 
 @pytest.fixture
 def run(tmp_path):
-    def done(text, *sections, machine="cartesian"):
+    def done(text, *sections, machine="cartesian", totals=False):
         (tmp_path / "stock.yaml").write_text("".join(sections))
         job = Job(load_config([shipped(f"config/{machine}.yaml"), tmp_path / "stock.yaml"]))
         program = program_of((text + "M30\n").encode(), "p.nc", job.config)
-        return compensate(program, job, method="newton", tolerance_um=1.0, version="1")
+        result = compensate(program, job, method="newton", tolerance_um=1.0, version="1")
+        return Totals.of(result, job) if totals else result
 
     return done
 
@@ -133,9 +135,9 @@ def test_what_contradicts_the_stock_is_told_with_its_lines(run, key, good, bad):
         section = line.split(":")[0]
         own = {"workpiece": BOX, "tool": TOOL}.get(section)
         if own is None:
-            return run(PASS, BOX, TOOL, line).warnings
+            return run(PASS, BOX, TOOL, line, totals=True).warnings
         merged = own.rstrip().removesuffix("}") + ", " + line.split("{")[1]
-        return run(PASS, *(merged if each is own else each for each in (BOX, TOOL))).warnings
+        return run(PASS, *(merged if each is own else each for each in (BOX, TOOL)), totals=True).warnings
 
     assert not [each for each in warned(good) if "source line" in each]
     assert [each for each in warned(bad) if each.endswith("at source line 5")]
