@@ -432,6 +432,7 @@ def test_a_clock_that_breaks_off_is_refused_with_its_place(read):
         ("q_d_{}", "q_{}", 1),
         ("cmd/position[{}] [deg]", "state/position[{}] [deg]", 0),
         ("Joint{}TargetPosition", "Joint{}ActualPosition", 1),
+        ("DES_POS|{}", "ENC1_POS|{}", 1),  # Sinumerik
     ],
 )
 def test_columns_that_count_all_joints_are_joints_in_order(read, asked, met, first):
