@@ -217,3 +217,35 @@ def test_an_arm_with_stated_masses_may_stand_still_in_a_run(tmp_path):
         two_link_log(tmp_path, name, seed, moves)
     result = asked(tmp_path, ["arm.yaml"], "abc", holdout=["b"])
     assert {c.target for c in result.causes if c.effect == "friction"} == {"J1", "J2"}
+
+
+RIG = """robot:
+  name: rig
+  type: serial
+  convention: dh
+  joints:
+    - {name: J, a_mm: 350}
+tool: {length_mm: 0}
+workpiece: {origin_mm: [350, 0, 0]}
+"""
+
+
+def test_a_joint_hung_otherwise_than_its_file_says_shows_its_stribeck_friction(tmp_path):
+    (tmp_path / "rig.yaml").write_text(RIG)  # an upright axis; the rig's lies, and carries 20 N m
+    for name, seed in (("a", 1), ("b", 5)):
+        t, q, v, w = course(seed)
+        rng, slow = np.random.default_rng(seed), 0.3 + 0.7 * np.sin(0.37 * t) ** 2  # it goes slowly, too
+        q, v, w = q * slow, np.gradient(q * slow, t), np.gradient(np.gradient(q * slow, t), t)
+        rubs = (12.0 + 6.0 * np.exp(-((v / 0.08) ** 2))) * np.tanh(v / 0.002) + 9.0 * v
+        torque = 2.2 * w + 20.0 * np.sin(q + 0.4) + rubs + rng.normal(0, 0.2, len(t))
+        write(tmp_path, name, {"t_s": t, "act_J_rad": q + rng.normal(0, 2e-6, len(t)), "act_J_Nmm": 1e3 * torque})
+    result = asked(tmp_path, ["rig.yaml"], "ab", holdout=["b"])
+    (friction,) = [c for c in result.causes if c.effect == "friction"]
+    for name, true in (
+        ("force_Nmm", 12e3),
+        ("viscous_Nmms_per_rad", 9e3),
+        ("stribeck_Nmm", 6e3),
+        ("stribeck_rad_per_s", 0.08),
+    ):
+        low, high = friction.parameters[name].ci95
+        assert low <= true <= high and high - low < 0.3 * true

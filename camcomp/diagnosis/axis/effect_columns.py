@@ -34,13 +34,9 @@ ChannelName = Literal["following", "behind", "force"]
 # of standing poses; of an interval that is searched; laws; a zero of an encoder
 ELSEWHERE = ("joint_hysteresis", "joint_curve", "disturbance", "formula", "map", "joint_offset")
 
-DRAG = {
-    hinge: tuple(p for p in shelf.load("effects", "friction").PARAMETERS if p.name in names)
-    for hinge, names in (
-        (False, ("viscous_Ns_per_mm", "asymmetry_Ns_per_mm")),
-        (True, ("viscous_Nmms_per_rad", "asymmetry_Nmms_per_rad")),
-    )
-}  # of friction, by hinge: with the speed, and with its size
+DRAG = {False: ("viscous_Ns_per_mm", "asymmetry_Ns_per_mm"), True: ("viscous_Nmms_per_rad", "asymmetry_Nmms_per_rad")}
+STRIBECK = {False: ("stribeck_N", "stribeck_mm_per_s"), True: ("stribeck_Nmm", "stribeck_rad_per_s")}
+# of friction, by hinge: with the speed, and with its size; the force at standstill, and the speed that ends it
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -223,21 +219,32 @@ def candidates(
             continue
         own = parameters_of(module, actuator.revolute)
         linear = tuple(p for p in own if not p.shape)
-        fits = [linear]
-        if channel == "force" and name == "friction":
-            fits += [(*linear, *DRAG[actuator.revolute][:many]) for many in (1, 2)]
         shapes = _shapes(module, own, axes, channel)
-        for shape, fitted in ((shape, fitted) for shape in shapes for fitted in fits if fitted):
+        fits = [(shape, linear) for shape in shapes if linear]
+        if channel == "force" and name == "friction":
+            fits = _with_more_friction(fits, actuator.revolute)
+        for shape, fitted in fits:
             names = {p.name for p in fitted}
             found.append(
                 AxisCause(
                     effect=name, module=module, target=actuator.name, parameters=fitted,
                     shape={key: value for key, value in shape.items() if key not in names},
-                    ways=float(len(shapes) * len(fits) * getattr(module, "GUESSED_FROM", 1)),
+                    ways=float(len(fits) * getattr(module, "GUESSED_FROM", 1)),
                     steps=tuple(shape[p.name] / p.scale if p.name in shape else 1.0 for p in fitted),
                 )
             )  # fmt: skip
     return found
+
+
+def _with_more_friction(
+    fits: Sequence[tuple[dict[str, float], tuple[Parameter, ...]]], hinge: bool
+) -> list[tuple[dict[str, float], tuple[Parameter, ...]]]:
+    """Shapes and parameters of Coulomb friction by itself, with friction of the speed, and with Stribeck's beside it."""
+    known = {p.name: p for p in shelf.load("effects", "friction").PARAMETERS}
+    viscous, asymmetry = (known[name] for name in DRAG[hinge])
+    more, slow = (known[name] for name in STRIBECK[hinge])
+    out = [(shape, (*own, *drag)) for shape, own in fits for drag in ((), (viscous,), (viscous, asymmetry))]
+    return out + [(shape | {slow.name: v}, (*own, viscous, more)) for shape, own in fits for v in slow.scan]
 
 
 def parameters_of(module: Any, hinge: bool) -> tuple[Parameter, ...]:

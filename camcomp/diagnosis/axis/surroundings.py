@@ -12,8 +12,8 @@ from camcomp.diagnosis.axis.effect_columns import DrivenAxis
 from camcomp.diagnosis.axis.findings import ROWS, AxisRun
 from camcomp.diagnosis.axis.rigid_bodies import torque_columns
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
-from camcomp.ground.datatypes import Floats
-from camcomp.model.statics.arm import Arm, arm_of, end_pose, jacobian
+from camcomp.ground.datatypes import STANDARD_GRAVITY, Floats
+from camcomp.model.statics.arm import ARM_LENGTH, Arm, arm_of, end_pose, jacobian
 from camcomp.model.statics.description import Actuator, Robot
 from camcomp.model.statics.hanging import hang
 from camcomp.model.statics.masses import has_moved_mass, mass_loads
@@ -59,13 +59,14 @@ class AxisSurroundings:
         return np.stack(out, axis=1)
 
     def bodies(self, name: str, run: AxisRun, moved: AxisTravel, wide: int) -> tuple[Floats, Floats]:
-        """Columns (n, c) of the bodies behind a hinge in its torque, and their part that is weight. On a machine that is no arm
-        both are sine and cosine of the angle.
+        """Columns (n, c) of the bodies behind a hinge in its torque, and their part that is weight.
+
+        Sine and cosine of its angle are among them: a hinge that is upright by the machine file may be mounted otherwise.
         """
+        angle = moved.position / lever_mm(True)
+        weight = 1e3 * STANDARD_GRAVITY * ARM_LENGTH * np.stack([np.sin(angle), np.cos(angle)], axis=1)
         arm = None if self.robot is None else arm_of(self.robot)
         if arm is None or self.robot is None:
-            angle = moved.position / lever_mm(True)
-            weight = np.stack([np.sin(angle), np.cos(angle)], axis=1)
             return weight, weight
         q = self.coordinates(run.name, moved.time)
         speed, acceleration = np.zeros_like(q), np.zeros_like(q)
@@ -75,7 +76,9 @@ class AxisSurroundings:
             acceleration[:, j] = np.interp(moved.time, own.time, own.acceleration) / lever
         at = self.index(name)
         still = np.zeros_like(q)
-        return torque_columns(arm.chain, at, q, speed, acceleration), torque_columns(arm.chain, at, q, still, still)
+        moving = torque_columns(arm.chain, at, q, speed, acceleration)
+        resting = torque_columns(arm.chain, at, q, still, still)
+        return np.column_stack([moving, weight]), np.column_stack([resting, weight])
 
     def others(self, name: str, run: AxisRun, wide: int) -> dict[str, AxisTravel]:
         """How the other axes moved in the same run."""
