@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.axis.effect_columns import AxisCause
+from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName
+from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.gate import within_a_row
 from camcomp.diagnosis.axis.row_noise import noise_of
-from camcomp.ground.datatypes import Floats
+from camcomp.diagnosis.axis.terms import AxisTravel
+from camcomp.ground.datatypes import Bools, Floats
 
 LEAST = 1e-3  # of the largest column: below it bodies do not show
 HEALTHY_SHARE = 0.3  # of the channel's size: scale of a size that every axis has
@@ -20,27 +22,56 @@ Sizes = Mapping[str, Floats]  # kind -> columns (n, q)
 Response = Callable[[int, Sequence[tuple[AxisCause, Floats]]], Floats]  # run, causes that act -> values (n,)
 
 
+def no_response(run: int, acting: Sequence[tuple[AxisCause, Floats]]) -> Floats:
+    """Response of a channel whose causes are not known yet."""
+    raise NotImplementedError
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChannelData:
-    """Rows of one channel, per run: values (n,), columns of healthy sizes, covariates (n,) of the dictionary.
+    """Rows of one channel of an axis, per run: the log, how the axis moved in the rows that count, and their values (n,).
 
-    response: what causes with their amplitudes (d,) add to the channel of run k (n,). floor: noise of the channel. train: runs
-    that are fitted. level: constant without a meaning. times (n,) s per run. clock: standard deviation of the instants of rows
-    against the motion, s. noise (n,) per run: of rows, in floors; 1 where it is not given. inertia: columns of healthy sizes
-    that are force of inertia alone.
+    train, test: runs that are fitted, and that are judged only. numbers: of the runs in their experiment. floor: noise of the
+    channel. whole: times and values of every row. asymmetric: whether friction in the drive force differs between the
+    directions, which deflects the loop. noise (n,) per run: of rows, in floors; 1 where it is not given. healthy: columns of
+    the sizes that every axis has; inertia: those that are force of inertia alone. covariates (n,) of the dictionary. response:
+    what causes with their amplitudes (d,) add to the channel of run k (n,). level: constant without a meaning. clock: standard
+    deviation of the instants of rows against the motion, s.
     """
 
+    channel: ChannelName
+    runs: Sequence[AxisRun]
+    moves: Sequence[AxisTravel]
     values: Sequence[Floats]
-    healthy: Sequence[Sizes]
-    covariates: Sequence[Mapping[str, Floats]]
-    response: Response
-    floor: float
     train: Sequence[int]
-    times: Sequence[Floats]
+    test: Sequence[int]
+    numbers: Sequence[int]
+    floor: float
+    stated: bool
+    whole: Sequence[tuple[Floats, Floats]]
+    asymmetric: bool = False
+    noise: Sequence[Floats] = ()
+    healthy: Sequence[Sizes] = ()
+    inertia: Sequence[Sizes] = ()
+    covariates: Sequence[Mapping[str, Floats]] = ()
+    response: Response = no_response
     level: float = 0.0
     clock: float = 0.0
-    noise: Sequence[Floats] = ()
-    inertia: Sequence[Sizes] = ()
+
+    @property
+    def hinge(self) -> bool:
+        """Whether the axis turns."""
+        return self.runs[0].revolute
+
+    @property
+    def fastest(self) -> float:
+        """Largest speed of the fitted runs."""
+        return max((float(np.abs(self.moves[k].speed).max(initial=0.0)) for k in self.train), default=0.0)
+
+    @property
+    def seen(self) -> list[Bools]:
+        """Rows (n,) of every run that count."""
+        return [np.isin(run.time, m.time) for run, m in zip(self.runs, self.moves, strict=True)]
 
     def in_floors(self, rows: Mapping[int, Floats]) -> Floats:
         """Rows of the fitted runs one after the other, each over its noise in floors. rows: values (n,) or columns (n, k) by run."""
@@ -78,7 +109,8 @@ class ChannelData:
         """
         if self.clock == 0.0:
             return self
-        slopes = [np.gradient(y - each, t)[:, None] for y, each, t in zip(self.values, left, self.times, strict=True)]
+        own = [y - each for y, each in zip(self.values, left, strict=True)]
+        slopes = [np.gradient(each, m.time)[:, None] for each, m in zip(own, self.moves, strict=True)]
         inertia = [np.sum([own[kind] @ sizes[kind] for kind in own], axis=0) for own in self.inertia]
         return replace(
             self, healthy=[{**own, CLOCK: each} for own, each in zip(self.healthy, slopes, strict=True)],

@@ -12,15 +12,15 @@ Source: Siciliano et al., Robotics, 7.3; `channel_fit` for the choice.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.channel_data import BODIES, TURNING, ChannelData, Response, base_of, healthy_sizes
+from camcomp.diagnosis.axis.channel_data import BODIES, TURNING, ChannelData, base_of, healthy_sizes
 from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel
 from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising, seen_elsewhere, sharp
-from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
+from camcomp.diagnosis.axis.effect_columns import AxisCause, DrivenAxis, candidates
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun, ChannelRun
 from camcomp.diagnosis.axis.gate import WITHIN, AxisGate, judge, not_known
 from camcomp.diagnosis.axis.row_noise import log_gain
@@ -38,34 +38,11 @@ TURNS_MM_PER_S = (0.3, 1.5, 5.0)  # speeds with which it may turn round instead
 CREEP = 0.02  # of the fastest row: speed at which Coulomb friction has turned round
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class JointRows:
-    """Rows of one channel of an axis: runs as logged, how the axis moved in the rows that count, and their values.
-
-    numbers: of the runs in their experiment. whole: times and values of every row, where these are more. asymmetric: whether
-    friction in its drive force differs between the directions, which deflects its loop. noise (n,) per run: of rows, in
-    floors; 1 where it is not given.
-    """
-
-    channel: ChannelName
-    runs: Sequence[AxisRun]
-    moves: list[AxisTravel]
-    values: list[Floats]
-    train: list[int]
-    test: list[int]
-    numbers: Sequence[int]
-    floor: float
-    stated: bool
-    whole: Sequence[tuple[Floats, Floats]] = ()
-    asymmetric: bool = False
-    noise: Sequence[Floats] = ()
-
-
-def study_channel(found: AxisFindings, rows: JointRows, around: AxisSurroundings, without: set[str]) -> AxisChannel:
+def study_channel(found: AxisFindings, rows: ChannelData, around: AxisSurroundings, without: set[str]) -> AxisChannel:
     """One more channel of an axis; its causes and what else it shows go into the findings."""
-    seen = [np.isin(run.time, m.time) for run, m in zip(rows.runs, rows.moves, strict=True)]
-    axes = [around.driven(found.name, run) for run in rows.runs]
-    if rows.channel == "force":
+    force, following = rows.channel == "force", rows.channel == "following"
+    seen, axes = rows.seen, [around.driven(found.name, run) for run in rows.runs]
+    if force:
         axes = [replace(a, way=_way(a.run, m, on)) for a, m, on in zip(axes, rows.moves, seen, strict=True)]
     terms = candidates(around.robot, [axes[k] for k in rows.train], rows.channel, sorted(without))
 
@@ -73,41 +50,36 @@ def study_channel(found: AxisFindings, rows: JointRows, around: AxisSurroundings
         causes = [term.cause(own.tolist()) for term, own in acting if term.run in (None, rows.runs[k].name)]
         return axes[k].channel(rows.channel, causes)[seen[k]] if causes else np.zeros(len(rows.values[k]))
 
-    following = rows.channel == "following"
-    healthy, inertia = _healthy(found, rows, around, seen, axes)
-    data = ChannelData(
-        values=rows.values, healthy=healthy, inertia=inertia, covariates=_covariates(found, rows, around),
-        response=response, floor=rows.floor, train=rows.train, times=[m.time for m in rows.moves], noise=rows.noise,
-        clock=WITHIN * _step(rows.moves) if rows.channel == "force" else 0.0,
+    healthy, inertia = _healthy(found, rows, around, axes)
+    data = replace(
+        rows, healthy=healthy, inertia=inertia, covariates=_covariates(found, rows, around), response=response,
+        clock=WITHIN * _step(rows.moves) if force else 0.0,
         level=0.0 if following else float(np.mean(np.concatenate([rows.values[k] for k in rows.train]))),
     )  # fmt: skip
     done = fit_channel(data, terms)
+    sure = [np.ones(len(each), bool) for each in rows.values]
     if following:
         texts = _following_laws(rows)
         behind = [term.cause(own.tolist()) for term, own in done.acting]
         columns = [_by_kind(texts, axes[k].laws(_all(texts), behind)[own]) for k, own in enumerate(seen)]
         done = _behind_causes(data, done, columns)
         found.laws = [_written_law(found, texts, done.sizes)]
-    if rows.channel == "force" and "disturbance" not in without:
-        done = _with_pushes(found.name, data, terms, done, rows)
-        done = _with_pushes_where_judged(found.name, data, done, rows)
+        told = {k: axes[k].known(behind)[seen[k]] for k in rows.test if behind}  # other rows say nothing of the causes
+        sure = [told[k] if k in told and told[k].any() else own for k, own in enumerate(sure)]
+    if force and "disturbance" not in without:
+        done = _with_pushes(found.name, data, terms, done)
+        done = _with_pushes_where_judged(found.name, data, done)
     if rows.channel == "behind":  # without zeros and clocks of two encoders, the rest is an error of the machine
         apart = [sum(own[kind] @ done.sizes[kind] for kind in ("offset", "delay")) for own in data.healthy]
-        rows = replace(rows, values=[each - own for each, own in zip(rows.values, apart, strict=True)])
-    sure = [np.ones(len(each), bool) for each in rows.values]
-    if following and done.acting:  # how well other rows are predicted says nothing of the causes
-        behind = [term.cause(own.tolist()) for term, own in done.acting]
-        told = {k: axes[k].known(behind)[seen[k]] for k in rows.test}
-        sure = [told[k] if k in told and told[k].any() else own for k, own in enumerate(sure)]
-    channel = _channel(rows, done, data.response, sure)
-    _tell(found, rows, done, data)
-    if (
-        rows.channel != "force" and float(np.std(channel.rows)) <= rows.floor
-    ):  # there is no gap that causes would explain
+        data = replace(data, values=[each - own for each, own in zip(data.values, apart, strict=True)])
+        data = replace(data, whole=[(m.time, own) for m, own in zip(data.moves, data.values, strict=True)])
+    channel = _channel(data, done, sure)
+    _tell(found, data, done)
+    if not force and float(np.std(channel.rows)) <= rows.floor:  # there is no gap that causes would explain
         channel.gate, channel.runs = AxisGate("at", 0.0, ()), [replace(r, left=r.gap) for r in channel.runs]
         found.laws = [] if following else found.laws
         return channel
-    if rows.channel == "force" and not rows.runs[0].revolute:
+    if force and not rows.hinge:
         _find_ripple(found, channel)
     if channel.gate is not None and channel.gate.word == "open" and done.drivers:
         channel.gate = replace(channel.gate, word="above")  # the size does not tell, a covariate does
@@ -132,14 +104,13 @@ def _find_ripple(found: AxisFindings, channel: AxisChannel) -> None:
     found.unknown_chance = min(found.unknown_chance, float(-odds / np.log(10.0)))
 
 
-def _following_laws(rows: JointRows) -> dict[str, tuple[str, ...]]:
+def _following_laws(rows: ChannelData) -> dict[str, tuple[str, ...]]:
     """Formulas of what every axis has in its following error, by kind, over its motion behind effects of the control, mm or rad.
 
     The speed is that of a lag too small or too unsure to be a cause.
     """
-    hinge = any(run.revolute for run in rows.runs)
-    fastest = max((float(np.abs(rows.moves[k].speed).max(initial=0.0)) for k in rows.train), default=0.0)
-    place, creep = "followed_rad" if hinge else "followed_mm", max(CREEP * fastest / lever_mm(hinge), 1e-12)
+    hinge = rows.hinge
+    place, creep = "followed_rad" if hinge else "followed_mm", max(CREEP * rows.fastest / lever_mm(hinge), 1e-12)
     out = {"acceleration": (f"{place}_per_s2",), "speed": (f"{place}_per_s",), "offset": ("1",)}
     if rows.asymmetric:
         out["asymmetry"] = (f"abs({place}_per_s)",)
@@ -193,54 +164,45 @@ def _way(run: AxisRun, moved: AxisTravel, seen: np.ndarray) -> Floats:
 
 
 def _healthy(
-    found: AxisFindings,
-    rows: JointRows,
-    around: AxisSurroundings,
-    seen: Sequence[np.ndarray],
-    axes: Sequence[DrivenAxis],
+    found: AxisFindings, rows: ChannelData, around: AxisSurroundings, axes: Sequence[DrivenAxis]
 ) -> tuple[list[dict[str, Floats]], list[dict[str, Floats]]]:
     """Columns of the sizes that every axis has, by kind, of every run, and those that are force of inertia alone."""
-    fastest = max((float(np.abs(rows.moves[k].speed).max(initial=0.0)) for k in rows.train), default=0.0)
+    seen, hinge, force = rows.seen, rows.hinge, rows.channel == "force"
+    forces = [run.force[on] for run, on in zip(rows.runs, seen, strict=True)]
+    loads = [np.stack([a.weight[on], a.inertia[on]], axis=1) for a, on in zip(axes, seen, strict=True)]
+    behind = force and hinge
     bodies = [
-        around.bodies(found.name, run, m, found.wide) if rows.channel == "force" and run.revolute else None
-        for run, m in zip(rows.runs, rows.moves, strict=True)
+        around.bodies(found.name, *each, found.wide) for each in zip(rows.runs, rows.moves, strict=True) if behind
     ]
-    base = base_of([parts[0] for k in rows.train if (parts := bodies[k]) is not None] or [np.zeros((1, 0))])
+    base = base_of([bodies[k][0] for k in rows.train if behind] or [np.zeros((1, 0))])
     out, inertia = [], []
     for k, m in enumerate(rows.moves):
-        one, hinge = np.ones((len(m.time), 1)), rows.runs[k].revolute
-        turns = np.tanh(m.speed / max(CREEP * fastest, 1e-12))[:, None]
         angle = m.position / lever_mm(True)
         weight = np.stack([np.sin(angle), np.cos(angle)], axis=1)
-        own = {"offset": one}
+        own = {"offset": np.ones((len(m.time), 1))}
         if rows.channel == "behind":
-            if hinge:
-                own["eccentricity"] = weight
-            force = rows.runs[k].force[seen[k]]
+            own |= {"eccentricity": weight} if hinge else {}
             own["delay"] = m.speed[:, None]
-            if np.isfinite(force).all() and all(np.isfinite(rows.runs[i].force).all() for i in rows.train):
-                own["compliance"] = force[:, None]
+            own |= {"compliance": forces[k][:, None]} if all(np.isfinite(each).all() for each in forces) else {}
         else:
             own["acceleration"] = m.acceleration[:, None]
         if rows.channel == "following" and hinge:
-            own |= {"friction": turns, "weight": weight}
+            own |= {"friction": np.tanh(m.speed / max(CREEP * rows.fastest, 1e-12))[:, None], "weight": weight}
         elif rows.channel == "following":
             own["friction"] = np.stack([m.reversal(way) for way in TURNS_MM], axis=1)
         if rows.asymmetric:
             own["asymmetry"] = np.abs(m.speed)[:, None]
-        if rows.channel == "force":
+        if force:
             own[TURNING] = _turning(m)
         moved = {kind: own[kind] for kind in own if kind == "acceleration"}
-        if (parts := bodies[k]) is not None:
-            own[BODIES], moved[BODIES] = parts[0] @ base, (parts[0] - parts[1]) @ base
-            stated = np.stack([axes[k].weight[seen[k]], axes[k].inertia[seen[k]]], axis=1)
-            if np.ptp(stated, axis=0).any():
-                own["stated masses"], moved["stated masses"] = stated, stated * [0.0, 1.0]
+        if force and hinge:
+            every, still = bodies[k]
+            own[BODIES], moved[BODIES] = every @ base, (every - still) @ base
+            if all(np.ptp(each, axis=0).any() for each in loads):
+                own["stated masses"], moved["stated masses"] = loads[k], loads[k] * [0.0, 1.0]
         out.append(own)
         inertia.append(moved)
-    common = set.intersection(*(set(each) for each in out))
-    healthy, moving = ([{kind: own[kind] for kind in own if kind in common} for own in each] for each in (out, inertia))
-    return healthy, moving
+    return out, inertia
 
 
 def _turning(m: AxisTravel) -> Floats:
@@ -248,7 +210,7 @@ def _turning(m: AxisTravel) -> Floats:
     return np.stack([np.tanh(m.speed / each) for each in TURNS_MM_PER_S], axis=1) - m.reversal(PRESLIDING_MM)[:, None]
 
 
-def _covariates(found: AxisFindings, rows: JointRows, around: AxisSurroundings) -> list[dict[str, Floats]]:
+def _covariates(found: AxisFindings, rows: ChannelData, around: AxisSurroundings) -> list[dict[str, Floats]]:
     out = []
     for run, m in zip(rows.runs, rows.moves, strict=True):
         own = {"position": m.position, "velocity": m.speed, "acceleration": m.acceleration, "time": m.time - m.time[0]}
@@ -262,24 +224,19 @@ def _covariates(found: AxisFindings, rows: JointRows, around: AxisSurroundings) 
     return [{name: own[name] for name in own if name in common} for own in out]
 
 
-def _with_pushes(
-    name: str, data: ChannelData, terms: Sequence[AxisCause], done: ChannelFit, rows: JointRows
-) -> ChannelFit:
-    """The fit jointly with disturbance forces, as long as the evidence takes one more.
-
-    data, terms: what is fitted to the runs `data.train`.
-    """
+def _with_pushes(name: str, data: ChannelData, terms: Sequence[AxisCause], done: ChannelFit) -> ChannelFit:
+    """The fit jointly with disturbance forces, as long as the evidence takes one more."""
     pushes: list[AxisCause] = []
     for _ in range(CAUSES):
         beside = {k: data.healthy_columns(k) for k in data.train}
         left = {k: done.left[k] for k in data.train}
-        found = find_window(left, beside, {k: rows.moves[k].time for k in left}, data.floor)
+        found = find_window(left, beside, {k: data.moves[k].time for k in left}, data.floor)
         if found is None:
             break
         window, rest = found
-        if not (sharp(window, rest, rows.moves[window.run].time) or seen_elsewhere(window, rows.moves)):
+        if not (sharp(window, rest, data.moves[window.run].time) or seen_elsewhere(window, data.moves)):
             break
-        more = [*pushes, _push(name, window, rows)]
+        more = [*pushes, _push(name, window, data)]
         again = fit_channel(data, [*terms, *more])
         if sum(c.effect == "disturbance" for c in again.causes) < len(more):
             break
@@ -287,10 +244,10 @@ def _with_pushes(
     return done
 
 
-def _with_pushes_where_judged(name: str, data: ChannelData, done: ChannelFit, rows: JointRows) -> ChannelFit:
+def _with_pushes_where_judged(name: str, data: ChannelData, done: ChannelFit) -> ChannelFit:
     """The fit with the disturbance forces of runs that are judged only, from the residual of each."""
-    for k in rows.test:
-        alone = _with_pushes(name, data.residual_of(k, done.left), [], done, rows)
+    for k in data.test:
+        alone = _with_pushes(name, data.residual_of(k, done.left), [], done)
         if alone is done:
             continue
         left = [*done.left]
@@ -301,7 +258,7 @@ def _with_pushes_where_judged(name: str, data: ChannelData, done: ChannelFit, ro
     return done
 
 
-def _push(name: str, window: Window, rows: JointRows) -> AxisCause:
+def _push(name: str, window: Window, rows: ChannelData) -> AxisCause:
     """A force in a window of a run."""
     run, time = rows.runs[window.run], rows.moves[window.run].time
     module = shelf.load("effects", "disturbance")
@@ -318,27 +275,27 @@ def _push(name: str, window: Window, rows: JointRows) -> AxisCause:
     )  # fmt: skip
 
 
-def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, data: ChannelData) -> None:
+def _tell(found: AxisFindings, rows: ChannelData, done: ChannelFit) -> None:
     """Sizes that every axis has, for the reader, in the units of the axis, where the rows determine them."""
     if not np.isfinite(done.covariance).all():
         return
-    lever = lever_mm(rows.runs[0].revolute)
+    lever = lever_mm(rows.hinge)
     if rows.channel == "following":
         found.details["following"] = {"acceleration_us2": done.combined({"acceleration": [-1e6]})}
         return
     if rows.channel == "behind":
         found.details["second_encoder"] = {"delay_ms": done.combined({"delay": [-1e3]})}
         if "compliance" in done.sizes:
-            key = "compliance_rad_per_Nmm" if rows.runs[0].revolute else "compliance_mm_per_N"
+            key = "compliance_rad_per_Nmm" if rows.hinge else "compliance_mm_per_N"
             found.details["second_encoder"][key] = done.combined({"compliance": [lever**-2]})
         return
-    if not rows.runs[0].revolute:
+    if not rows.hinge:
         found.details["force"] = {
             "mass_kg": done.combined({"acceleration": [1e3]}), "constant_N": done.combined({"offset": [1.0]})
         }  # fmt: skip
         return
-    parts = {kind: np.concatenate([data.inertia[k][kind] for k in rows.train]) for kind in data.inertia[0]}
-    every = {kind: np.concatenate([data.healthy[k][kind] for k in rows.train]) for kind in parts}
+    parts = {kind: np.concatenate([rows.inertia[k][kind] for k in rows.train]) for kind in rows.inertia[0]}
+    every = {kind: np.concatenate([rows.healthy[k][kind] for k in rows.train]) for kind in parts}
     weight = np.sum([(every[kind] - parts[kind]) @ done.sizes[kind] for kind in parts], axis=0)
     speeding = parts["acceleration"][:, 0]  # its own: by which the bodies' inertia is judged
     by_own = {
@@ -351,12 +308,12 @@ def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, data: ChannelD
     }
 
 
-def _channel(rows: JointRows, done: ChannelFit, response: Response, sure: Sequence[Bools]) -> AxisChannel:
+def _channel(rows: ChannelData, done: ChannelFit, sure: Sequence[Bools]) -> AxisChannel:
     """Residuals of the fitted runs, and of those that are judged only, against the floor; sure (n,) per run: rows that count."""
     moves, values = rows.moves, rows.values
     constant = done.sizes["offset"][0] if rows.channel == "force" else 0.0
     pushing = [each for each in done.acting if each[0].run is not None]
-    pushed = [response(k, pushing) for k in range(len(values))]
+    pushed = [rows.response(k, pushing) for k in range(len(values))]
     spread = 1.0
     if rows.noise:  # as large as it is seen to be at most
         floors = [(rows.noise[k], np.maximum(np.abs(done.left[k]) / rows.floor, 1.0)) for k in rows.train]
@@ -365,7 +322,7 @@ def _channel(rows: JointRows, done: ChannelFit, response: Response, sure: Sequen
         runs=[
             ChannelRun(
                 name=rows.runs[k].name, number=rows.numbers[k], fitted=k in rows.train, move=moves[k],
-                whole=rows.whole[k] if rows.whole else (moves[k].time, values[k]),
+                whole=rows.whole[k],
                 gap=values[k] - constant - (0.0 if k in rows.train else pushed[k]), left=done.left[k],
             ).of(sure[k])
             for k in (*rows.train, *rows.test)

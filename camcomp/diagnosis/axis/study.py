@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.axis import answer
-from camcomp.diagnosis.axis.channel_data import base_of
+from camcomp.diagnosis.axis.channel_data import ChannelData, base_of
 from camcomp.diagnosis.axis.findings import ROWS, AxisFindings, AxisRun
-from camcomp.diagnosis.axis.joint import JointRows, study_channel
+from camcomp.diagnosis.axis.joint import study_channel
 from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
 from camcomp.diagnosis.axis.next_moves import next_moves
@@ -156,10 +156,10 @@ class AxisTask:
         base = base_of([every[k] for k in self.train])
         return [each @ base for each in every]
 
-    def rows(self, moves: list[AxisTravel], values: list[Floats], **of_channel: Any) -> JointRows:
+    def rows(self, moves: list[AxisTravel], values: list[Floats], **of_channel: Any) -> ChannelData:
         """Rows of a channel by its motion and values."""
         every = {"numbers": range(len(self.usable)), "runs": self.usable, "train": self.train, "test": self.test}
-        return JointRows(moves=moves, values=values, **{**every, **of_channel})
+        return ChannelData(moves=moves, values=values, **{**every, **of_channel})
 
 
 def _axis(
@@ -254,7 +254,7 @@ def _study_second_encoder(found: AxisFindings, task: AxisTask) -> None:
     floor = stated or float(np.hypot(np.sqrt(2.0) * own, REPEATABILITY_MM))
     rows = task.rows(
         moves, values, channel="behind", floor=floor, stated=stated is not None, runs=runs, train=train, test=test,
-        numbers=every,
+        numbers=every, whole=[],
     )  # fmt: skip
     found.behind = study_channel(found, rows, task.around, task.without)
 
