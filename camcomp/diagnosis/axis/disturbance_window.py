@@ -11,6 +11,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.diagnosis.model.window import best_window
+from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 CELL_S = 0.02  # in which a window begins and ends, before it is placed to a row
@@ -19,7 +20,6 @@ LEVEL = 0.5  # of the shift: every quarter of a window has to show it to within 
 QUARTERS = 4
 LEAST_SIZE = 2.0  # of the floor, that a push has to be: a force's zero wanders by less
 PLACES = 40  # of the travel, each way of its own
-BEEN = 0.5  # of a window's rows, at places where the axis was at other times as well
 FARTHEST = 3  # cells by which an end is moved to its row
 SHARP_S, SHARP = (
     0.02,
@@ -117,7 +117,7 @@ def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
     at = [places(m) for m in moves]
     mine = at[window.run][window.first : window.last]
     others = [np.delete(p, slice(window.first, window.last)) if k == window.run else p for k, p in enumerate(at)]
-    return float(np.isin(mine, np.concatenate(others)).mean()) > BEEN
+    return float(np.isin(mine, np.concatenate(others)).mean()) > EVEN
 
 
 def away_from_ends(first: int, last: int, time: Floats) -> tuple[Bools, Bools]:

@@ -22,7 +22,6 @@ ROWS = 50  # below which a run says nothing
 FIRST_MOVE_MM = 0.2  # after which friction has its sense
 MOVING = 0.1  # of the fastest row's way
 FAR = 10.0  # times as far goes an axis that moves
-GAP_MARGIN_ROWS = 5  # rows of which a gap leaves speed and acceleration uncertain
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -114,7 +113,7 @@ class AxisRun:
         gaps = np.flatnonzero(missing_rows(self.time))
         near = np.zeros(len(self.time), bool)
         for gap in gaps:
-            near[max(gap + 1 - GAP_MARGIN_ROWS, 0) : gap + 1 + GAP_MARGIN_ROWS] = True
+            near[max(gap + 1 - WIDE[0], 0) : gap + 1 + WIDE[0]] = True  # rows of a cubic across it
         if not near.any() or near.mean() > EVEN:
             return self
         return replace(self, seen=~near)

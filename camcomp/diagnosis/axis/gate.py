@@ -16,8 +16,6 @@ from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.ground.datatypes import Floats
 
 LOCAL = 2.0  # of the floor's square, that a stretch has to show: as much again as the floor
-GOING_ON = 0.5  # of the floor's square, that rows behind each other have to share in a stretch: half of what LOCAL asks for beyond it
-MEDIAN = 0.9065  # of the variance of eight rows of white noise over its mean (chi-square of seven)
 STRETCHES = 25  # of all runs, in which the size of a leftover is looked at
 STRETCH_S = 0.5  # in which a leftover is looked for
 LEAST_STRETCHES = 8  # of which one can stand out
@@ -58,7 +56,7 @@ def energy(left: Floats, floor: float) -> float:
         return float(np.mean(left**2)) if len(left) else 0.0
     blocks = left[:n].reshape(-1, BLOCK)
     slow, fast = blocks.mean(axis=1), blocks.var(axis=1)
-    usual = float(np.median(fast)) / MEDIAN
+    usual = float(np.median(fast)) * (BLOCK - 1) / float(chi2.median(BLOCK - 1))
     noise = min(float(fast.mean()), max(usual, floor**2 * (1.0 - 1.0 / BLOCK)))
     # of the means, too, what tails do to them
     beyond = max(float(fast.mean()) - noise, 0.0) / (BLOCK - 1)
@@ -90,7 +88,8 @@ def intervals(
     pure = chi2.isf(FALSE / len(stretches), rows_each) / rows_each  # what even white noise reaches
     chances = norm.logsf((log - middle) / max(spread, 1e-12)) / np.log(10.0) + np.log10(len(stretches))
     out = (chances < np.log10(FALSE)) & (size > LOCAL * floor**2) & (size > pure * np.exp(middle))
-    out &= np.array([_going_on(left[k][rows]) for k, rows in stretches]) > GOING_ON * floor**2
+    shared = np.array([_going_on(left[k][rows]) for k, rows in stretches])
+    out &= shared > 0.5 * (LOCAL - 1.0) * floor**2  # half of what is beyond the floor
     joined: list[IntervalShare] = []
     for i in np.flatnonzero(out).tolist():
         k, rows = stretches[i]

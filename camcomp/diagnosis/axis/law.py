@@ -18,7 +18,7 @@ from camcomp.diagnosis.law.bench_terms import Spot, Term, TermRows
 from camcomp.diagnosis.law.describe import law_result
 from camcomp.diagnosis.law.find import BETTER, FoundLaw, find_law, fitted, strengths
 from camcomp.diagnosis.law.folds import Folds, RunColumns, Split, usual_split
-from camcomp.diagnosis.law.forms import Form, at_drive
+from camcomp.diagnosis.law.forms import HARD_MM, Form, at_drive
 from camcomp.diagnosis.law.screen import grids_of
 from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.model.noise import MINOR
@@ -28,9 +28,8 @@ from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 from camcomp.model.law.covariates import REFERENCE_C
 
-TURN_MM = 0.02  # way over which a reversal changes the sense
 WAVES = ("sin(2*pi*act_mm/{0})", "cos(2*pi*act_mm/{0})")
-ONE_WAY = (f"max(way(act_mm, {TURN_MM}), 0)", f"max(-way(act_mm, {TURN_MM}), 0)")
+ONE_WAY = (f"max(way(act_mm, {HARD_MM}), 0)", f"max(-way(act_mm, {HARD_MM}), 0)")
 FIXED = 1e6  # of what the rows tell of a size: it stays
 FIT_AGAIN = 2  # searches: the noise of the first one has the law in it
 

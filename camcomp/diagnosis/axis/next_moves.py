@@ -14,6 +14,7 @@ import numpy as np
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.findings import AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import STRETCH_S
+from camcomp.diagnosis.axis.surroundings import POSES
 from camcomp.diagnosis.axis.terms import travel
 from camcomp.diagnosis.model.design import designed
 from camcomp.diagnosis.model.discrepancy import smooth_functions
@@ -28,7 +29,6 @@ LENGTHS = (1.0, 0.3, 0.05)  # of the travel that the runs had
 SPEEDS = (0.05, 0.2, 0.5, 1.0)  # of the speed that they had
 REST_S = 0.2  # at either end of a stroke
 USED = 0.99  # quantile of what the runs had that strokes may have
-ROWS = 200  # of a foreseen motion
 _MEANS = {
     "position": "If what is left of {0} is the same at the same place in every stroke, it goes with the position: screw, scale or guide.",
     "velocity": "If it changes with the speed, or from one way to the other, it goes with the velocity: friction or the loop.",
@@ -112,7 +112,7 @@ def _functions(moves: AxisMoves, ends: Sequence[tuple[float, float]]) -> Floats:
     """Functions (n, k) of position, speed and acceleration of strokes, one floor in size; a stretch of time counts once."""
     time, place = set_points(moves)
     speed = np.gradient(place, time)
-    some = np.linspace(0, len(time) - 1, ROWS).astype(int)
+    some = np.linspace(0, len(time) - 1, POSES).astype(int)
     motion = place, speed, np.gradient(speed, time)
     each = [smooth_functions(values[some], *own) for values, own in zip(motion, ends, strict=True)]
     return np.asarray(np.hstack(each) * np.sqrt(time[-1] / STRETCH_S / len(some)), float)

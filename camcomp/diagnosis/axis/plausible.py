@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from camcomp.diagnosis.axis.findings import ROWS, AxisRun
+from camcomp.diagnosis.axis.motion import LATEST_S
 from camcomp.diagnosis.axis.noise_floor import rows_floor
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, solve, travel
 from camcomp.diagnosis.model.readings import Reading, refuse_as_read
@@ -14,7 +15,6 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
 HEAVIEST_KG = 2e4  # of what one drive moves
-SLOWEST_S = 0.5  # of a loop that still follows its set-points
 LARGE = 0.5  # of the travel: a gap that is no lag
 MIDDLE = (0.02, 0.98)  # quantiles between which values are looked at
 TRAVELS = 100.0  # deviations of a row that an axis which moves goes at least
@@ -83,8 +83,8 @@ def _check_size(log: str, name: str, run: AxisRun, cutting: bool) -> None:
     at = travel(run.time[known], run.encoder[known], WIDE[-1])
     A = np.stack([np.ones_like(at.time), 1e-3 * at.acceleration, at.speed, np.sign(at.speed)], axis=1)
     gap = (run.setpoint - run.encoder)[known]
-    if np.isfinite(gap).all() and solve(A, gap)[2] > SLOWEST_S:
-        raise _refused("CC407", log, f"{name} follows more than {SLOWEST_S:g} s late: t_s looks as if logged in ms")
+    if np.isfinite(gap).all() and solve(A, gap)[2] > LATEST_S:
+        raise _refused("CC407", log, f"{name} follows more than {LATEST_S:g} s late: t_s looks as if logged in ms")
     mass = 0.0 if cutting else _moved_kg(at, run.force[known])
     if mass > HEAVIEST_KG:
         what = (

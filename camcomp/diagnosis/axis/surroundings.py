@@ -18,7 +18,7 @@ from camcomp.model.statics.description import Actuator, Robot
 from camcomp.model.statics.hanging import hang
 from camcomp.model.statics.masses import has_moved_mass, mass_loads
 
-POSES = 400  # of a run at which the rates of the machine are worked out; between them they are straight
+POSES = 400  # of a run or a proposed motion that are worked out; between them all is straight
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model.law.covariates import is_load, load_of
 
 MOST_WAVES = 240  # periods of one covariate that are tried
-_HARD_MM = 0.02  # a reversal that is over at once
+HARD_MM = 0.02  # a reversal that is over at once
 _CENTRES, _MOMENTS = 13, 40
 _LASTS = (0.5, 1.0, 2.0, 4.0, 8.0)  # s that something acts for
 Bounds = tuple[tuple[float, float], ...]
@@ -145,11 +145,11 @@ def _powers(name: str, unit: str, most: int) -> Iterator[Form]:
 def _senses(name: str, span: float) -> Iterator[Form]:
     """Forms of the sense of travel: at once, over a length, as lost motion, or decaying after a reversal."""
     kinds: list[tuple[str, str, str, tuple[float, ...], tuple[float, float]]] = [
-        ("sense", f"way({name}, {{0}})", "", (0.02, 0.06, 0.18), (0.2 * _HARD_MM, 0.5 * span)),
+        ("sense", f"way({name}, {{0}})", "", (0.02, 0.06, 0.18), (0.2 * HARD_MM, 0.5 * span)),
         ("drag", f"drag({name}, {{0}})", "mm", (0.04, 0.12, 0.3), (0.005 * span, 0.8 * span)),
-        ("reversal", f"way({name}, {_HARD_MM})*exp(-since({name})/{{0}})", "", (0.02, 0.06, 0.2), (0.005 * span, 0.8 * span)),
+        ("reversal", f"way({name}, {HARD_MM})*exp(-since({name})/{{0}})", "", (0.02, 0.06, 0.2), (0.005 * span, 0.8 * span)),
     ]  # fmt: skip
-    yield _one("sense", name, f"way({name}, {{0}})", "", (_HARD_MM,), bounds=(kinds[0][4],))
+    yield _one("sense", name, f"way({name}, {{0}})", "", (HARD_MM,), bounds=(kinds[0][4],))
     for family, text, unit, shares, bounds in kinds:
         for share in shares:
             yield _one(family, name, text, unit, (share * span,), bounds=(bounds,))
