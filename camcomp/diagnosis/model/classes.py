@@ -33,9 +33,9 @@ def alternatives_of(explanation: Explanation, place_of: Sequence[tuple[str, str 
         if places == own or places > own:
             continue
         near = p >= top * np.exp(-EQUAL_LOG_ODDS)
-        if not near and len(members) <= len(best) and p > 0.0:
+        if not near and len(members) <= len(best) and p >= top * np.exp(-2.0 * EQUAL_LOG_ODDS):
             _, left = _remaining(data.gram, data.indices(best), amount, data.indices(members))
-            near = left < INDISTINGUISHABLE and p >= top * np.exp(-2.0 * EQUAL_LOG_ODDS)
+            near = left < INDISTINGUISHABLE
         if near:
             out.append(members)
     return out[:MOST_SETS]

@@ -34,8 +34,6 @@ ROUNDS = 6  # of discrepancies, one more each
 STATED = 0.08  # log deviation of a stated noise: instruments know themselves to an eighth in the square
 EXCESS = 1.2  # of the floor: noise above it is unmodelled
 NOISES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0, 9.0)  # factors on the floor
-SIGNED = 3  # passes in which columns of families that are below 0 and may not be are left out
-SHOWN = 1e-12  # probability of a set that is kept
 
 
 @dataclass(frozen=True)
@@ -87,12 +85,14 @@ class Explanation:
             amount[on], covariance[np.ix_(on, on)], _ = data.estimate(self.members)
         if self.background.families:
             on, absent, slab = self.columns, list[int](), self.data.slab(self.members)
-            for _ in range(SIGNED):
+            while True:
                 at = self.model.posterior(self.background, slab, absent=absent)
-                on = [j for j in on if j not in absent]
-                amount = np.zeros(k)
-                amount[on] = at.mean[on]
-                absent += [j for j in on if self.model.bounds.sign[j] > 0.0 and amount[j] < 0.0]
+                below = [j for j in on if self.model.bounds.sign[j] > 0.0 and at.mean[j] < 0.0]
+                if not below:
+                    break
+                absent, on = [*absent, *below], [j for j in on if j not in below]
+            amount = np.zeros(k)
+            amount[on] = at.mean[on]
             covariance[np.ix_(on, on)] = at.covariance(on)
         return amount, covariance
 
@@ -230,8 +230,6 @@ def posterior_of(
     for (background, members, _), each in zip(flat, p.tolist(), strict=True):
         if background.unknown or background.noise > EXCESS:
             unknown += each
-        if each < SHOWN:
-            continue
         for name, _ in background.families:
             families[name] = families.get(name, 0.0) + each
         own = frozenset(model.candidates[i].place for i in members)

@@ -15,9 +15,10 @@ from scipy.stats import norm
 from camcomp.diagnosis.model.evidence import Background, LinearModel, Members
 from camcomp.diagnosis.model.group import SmoothProcess, split_regions
 from camcomp.diagnosis.model.noise import AT_FLOOR
+from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.ground.datatypes import Floats
 
-SURELY, LIKELY = 2.33, 1.64  # standard errors: 99 % and 95 %, one side
+LIKELY = 1.64  # standard errors: 95 %, one side
 ABOVE = 1.25  # of the floor's square: instruments know themselves to an eighth
 REGIONS = 16  # of positions or time, between which squares are compared
 
@@ -42,7 +43,7 @@ class Excess:
     @property
     def above(self) -> bool:
         """Whether the residual surely exceeds the noise."""
-        return self.mean - SURELY * self.error > ABOVE
+        return self.mean - float(norm.isf(FALSE)) * self.error > ABOVE
 
     @property
     def at_floor(self) -> bool:
