@@ -20,8 +20,6 @@ from camcomp.model.statics.arm import ARM_LENGTH
 
 ROWS = 50  # below which a run says nothing
 FIRST_MOVE_MM = 0.2  # after which friction has its sense
-MOVING = 0.1  # of the fastest row's way
-FAR = 10.0  # times as far goes an axis that moves
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -98,13 +96,11 @@ class AxisRun:
             return self
         way = self.setpoint if np.isfinite(self.setpoint).all() and np.ptp(self.setpoint) > 0.0 else self.encoder
         read = way - np.gradient(way, self.time) * off  # where it was at the tick, if the clock is right
-        fast = np.abs(np.diff(way))
-        moving = (fast > MOVING * fast.max())[2:-1]  # at rest no clock shows
-        rough = [float(np.median(np.abs(np.diff(each, 4)[moving]))) if moving.any() else 0.0 for each in (way, read)]
+        fast = np.abs(np.diff(way))[2:-1]  # at rest no clock shows
+        rough = [float(np.abs(np.diff(each, 4)) @ fast) for each in (way, read)]
         if rough[0] >= EVEN * rough[1]:
             return self
-        time = self.time - off
-        return replace(self, time=time)
+        return replace(self, time=self.time - off)
 
     def away_from_gaps(self) -> AxisRun:
         """The run with the rows next to missing ones masked, since their speed is unknown; unmasked where that would
@@ -121,7 +117,7 @@ class AxisRun:
     def moved(self) -> Bools:
         """Rows (n,) from the first move on: which way friction held the axis before nobody knows. All where it stays."""
         away = np.abs(self.encoder - self.encoder[:1])
-        if not away.max(initial=0.0) > FAR * FIRST_MOVE_MM:
+        if not away.max(initial=0.0) > FIRST_MOVE_MM:
             return np.ones(len(away), bool)
         return np.arange(len(away)) >= int(np.argmax(away > FIRST_MOVE_MM))
 

@@ -9,14 +9,13 @@ from typing import Literal
 import numpy as np
 from scipy.stats import chi2, norm
 
-from camcomp.diagnosis.model.folds import Excess
+from camcomp.diagnosis.model.folds import REGIONS, Excess
 from camcomp.diagnosis.result.types import IntervalShare
 from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.ground.datatypes import Floats
 
 LOCAL = 2.0  # of the floor's square, that a stretch has to show: as much again as the floor
-STRETCHES = 25  # of all runs, in which the size of a leftover is looked at
 STRETCH_S = 0.5  # in which a leftover is looked for
 LEAST_STRETCHES = 8  # of which one can stand out
 LEAST_ROWS = 20  # of a stretch
@@ -37,7 +36,7 @@ def judge(left: Sequence[Floats], times: Sequence[Floats], floor: float, names: 
     """Judge residuals (n,) mm or N at times (n,) s of runs with names against a floor."""
     found, chance = intervals(left, times, floor, names)
     floor = max(floor, 1e-12)
-    parts = max(STRETCHES // len(left), 2)
+    parts = max(REGIONS // len(left), 2)
     size = np.array([energy(part, floor) for run in left for part in np.array_split(run, parts)]) / floor**2
     excess = Excess(float(size.mean()), float(size.std(ddof=1)) / np.sqrt(len(size)))
     if excess.above or found:

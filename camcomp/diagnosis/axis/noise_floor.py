@@ -15,7 +15,6 @@ STAYING = 0.1  # of the rows that do not move, from which on steps are a resolut
 SPIKE = 12.0  # deviations from the neighbours' median
 FAST_S = 0.005  # between rows: within two of them no drive goes out and comes back, however little
 LEAST_SPIKE_MM = 0.1  # the same between rows that are further apart: none goes so far
-MOST_SPIKES = 0.03  # of the rows; more are no mistakes
 QUIET = 0.1  # of the rows, which even busy moves leave without a corner
 NEIGHBOURS = 3  # rows on either side, so that two that follow each other do not hide each other
 
@@ -38,8 +37,7 @@ def rows_floor(channels: Sequence[Floats]) -> float:
 def spikes(y: Floats, least: float) -> np.ndarray:
     """Mask (n,) of rows above or below both neighbourhoods by more than SPIKE deviations, `least`, and any usual step.
 
-    A row's deviation is that of its neighbours, and at least the resolution, by which a standing axis flickers. The
-    mask is empty where such rows are many.
+    A row's deviation is that of its neighbours, and at least the resolution, by which a standing axis flickers.
     """
     rows = np.flatnonzero(np.isfinite(y))
     out = np.zeros(len(y), bool)
@@ -54,7 +52,7 @@ def spikes(y: Floats, least: float) -> np.ndarray:
     step = 3.0 * float(np.quantile(np.abs(np.diff(known)), 0.95))
     scatter = max(float(median_abs_deviation(off, scale="normal")), rows_floor([known]))
     out[rows] = over > max(SPIKE * scatter, least, step)
-    return out if out.mean() <= MOST_SPIKES else np.zeros(len(y), bool)
+    return out
 
 
 def following_floor(pairs: Sequence[tuple[Floats, Floats]]) -> float:
