@@ -10,7 +10,7 @@ import numpy as np
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName
 from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.gate import within_a_row
-from camcomp.diagnosis.axis.row_noise import noise_of
+from camcomp.diagnosis.axis.row_noise import noise_after_fit
 from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.ground.datatypes import Bools, Floats
 
@@ -139,18 +139,8 @@ def shrunk(A: Floats, y: Floats, prior: Floats, sd: float) -> tuple[Floats, Floa
     return mean, np.linalg.pinv(rows.T @ rows, rcond=1e-12, hermitian=True) * np.outer(unit, unit)
 
 
-def healthy_sizes(
-    columns: Sequence[Sizes], values: Sequence[Floats], floor: float, noise: Sequence[Floats]
-) -> tuple[dict[str, Floats], Floats]:
-    """Sizes by kind that every axis has in values (n,) per run, under their prior, with their covariance.
-
-    floor: least noise of a row; noise (n,) per run, in floors. The prior is that of `fit_channel`.
-    """
-    by = np.concatenate([*noise])
-    X = np.concatenate([np.concatenate([*own.values()], axis=1) for own in columns]) / by[:, None]
-    y = np.concatenate([*values]) / by
-    size = np.sqrt(np.mean(X**2, axis=0)) + 1e-300
-    sd = noise_of(y - X / size @ np.linalg.lstsq(X / size, y, rcond=1e-9)[0], floor)
-    mean, covariance = shrunk(X, y, max(HEALTHY_SHARE * float(np.sqrt(np.mean(y**2))), 1e-6 * sd) / size, sd)
-    ends = np.cumsum([own.shape[1] for own in columns[0].values()])[:-1]
-    return dict(zip(columns[0], np.split(mean, ends), strict=True)), covariance
+def healthy_sizes(columns: Floats, values: Floats, floor: float) -> tuple[Floats, Floats]:
+    """Sizes (q,) that every axis has, of columns (n, q) in values (n,), under the prior of `fit_channel`, with their covariance."""
+    sd, size = noise_after_fit(columns, values, floor), np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
+    most = max(HEALTHY_SHARE * float(np.sqrt(np.mean(values**2))), 1e-6 * sd)
+    return shrunk(columns, values, most / size, sd)

@@ -17,7 +17,7 @@ import numpy as np
 from camcomp.diagnosis.axis.channel_data import ChannelData, shrunk
 from camcomp.diagnosis.axis.effect_columns import AxisCause
 from camcomp.diagnosis.axis.gate import KNOWN
-from camcomp.diagnosis.axis.row_noise import noise_of
+from camcomp.diagnosis.axis.row_noise import noise_after_fit
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
 from camcomp.diagnosis.model.discrepancy import covariate_columns, gains_of_more, smooth_functions
@@ -237,9 +237,7 @@ def _noise(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> flo
     """
     A = data.in_floors({k: np.hstack((responses[k][0], data.healthy_columns(k))) for k in data.train})
     y = data.in_floors({k: data.values[k] - responses[k][1] for k in data.train})
-    size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
-    left = y - A / size @ np.linalg.lstsq(A / size, y, rcond=1e-9)[0]
-    return noise_of(left, data.floor)
+    return noise_after_fit(A, y, data.floor)
 
 
 def _explained(
@@ -406,7 +404,7 @@ def _gains_of_functions(
     found, model = linear.found, linear.model
     y, light = (data.in_floors(dict(enumerate(each))) for each in (left, [np.ones(len(own)) for own in left]))
     B = np.hstack([np.zeros((len(y), 0)), *_functions(data).values()]) * light[:, None]
-    rest = noise_of(y - B @ np.linalg.lstsq(B, y, rcond=1e-9)[0], data.floor)
+    rest = noise_after_fit(B, y, data.floor)
     out = []
     for factor in (1.0, min(rest / sd, 1.0)):
         best: dict[str, float] = {}

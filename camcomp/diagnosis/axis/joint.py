@@ -61,8 +61,7 @@ def study_channel(found: AxisFindings, rows: ChannelData, around: AxisSurroundin
     if following:
         texts = _following_laws(rows)
         behind = [term.cause(own.tolist()) for term, own in done.acting]
-        columns = [_by_kind(texts, axes[k].laws(_all(texts), behind)[own]) for k, own in enumerate(seen)]
-        done = _behind_causes(data, done, columns)
+        done = _behind_causes(data, done, texts, [axes[k].laws(_all(texts), behind)[own] for k, own in enumerate(seen)])
         found.laws = [_written_law(found, texts, done.sizes)]
         told = {k: axes[k].known(behind)[seen[k]] for k in rows.test if behind}  # other rows say nothing of the causes
         sure = [told[k] if k in told and told[k].any() else own for k, own in enumerate(sure)]
@@ -123,23 +122,17 @@ def _all(texts: Mapping[str, Sequence[str]]) -> list[str]:
     return [text for own in texts.values() for text in own]
 
 
-def _by_kind(texts: Mapping[str, Sequence[str]], columns: Floats) -> dict[str, Floats]:
-    """Columns (n, q) of all formulas, by kind."""
-    ends = np.cumsum([len(own) for own in texts.values()])[:-1]
-    return dict(zip(texts, np.split(columns, ends, axis=1), strict=True))
-
-
-def _behind_causes(data: ChannelData, done: ChannelFit, columns: Sequence[Mapping[str, Floats]]) -> ChannelFit:
-    """The fit of a following error with the residual of its written laws and causes. columns (n, q): of the laws by kind, per run."""
+def _behind_causes(
+    data: ChannelData, done: ChannelFit, texts: Mapping[str, Sequence[str]], columns: Sequence[Floats]
+) -> ChannelFit:
+    """The fit of a following error with the residual of its written laws and causes. columns (n, q): of the laws, per run."""
     rest = [values - data.response(k, done.acting) for k, values in enumerate(data.values)]
-    own, values, noise = (
-        [columns[k] for k in data.train],
-        [rest[k] for k in data.train],
-        [data.noise[k] for k in data.train],
-    )
-    sizes, covariance = healthy_sizes(own, values, data.floor, noise)
-    left = [own - sum(columns[k][kind] @ size for kind, size in sizes.items()) for k, own in enumerate(rest)]
-    return replace(done, sizes=sizes, covariance=covariance, left=left)
+    rows, values = (data.in_floors(dict(enumerate(each))) for each in (columns, rest))
+    sizes, covariance = healthy_sizes(rows, values, data.floor)
+    left = [own - each @ sizes for own, each in zip(rest, columns, strict=True)]
+    ends = np.cumsum([len(own) for own in texts.values()])[:-1]
+    by_kind = dict(zip(texts, np.split(sizes, ends), strict=True))
+    return replace(done, sizes=by_kind, covariance=covariance, left=left)
 
 
 def _written_law(found: AxisFindings, texts: Mapping[str, Sequence[str]], sizes: Mapping[str, Floats]) -> LawPart:

@@ -13,8 +13,14 @@ def log_gain(left: Floats, columns: Floats, more: Floats, floor: float) -> float
     A = columns / (np.sqrt(np.mean(columns**2, axis=0)) + 1e-300)
     X = more - A @ np.linalg.lstsq(A, more, rcond=1e-9)[0]
     X = X / (np.sqrt(np.mean(X**2, axis=0)) + 1e-300)
-    sd = noise_of(left - X @ np.linalg.lstsq(X, left, rcond=1e-9)[0], floor)
+    sd = noise_after_fit(X, left, floor)
     return float(gains_at_scales(X.T @ X, X.T @ left / sd)[0].max())
+
+
+def noise_after_fit(columns: Floats, values: Floats, floor: float) -> float:
+    """Standard deviation of a row that counts as one of its own, from what columns (n, k) leave of values (n,)."""
+    A = columns / (np.sqrt(np.mean(columns**2, axis=0)) + 1e-300)
+    return noise_of(values - A @ np.linalg.lstsq(A, values, rcond=1e-9)[0], floor)
 
 
 def noise_of(left: Floats, floor: float) -> float:
