@@ -90,6 +90,7 @@ class Interpreter(Settings, Cycles):
     def perform(self, block: Block) -> bool:
         """Execute a block; True if it ends the program."""
         self.record.begin_line(block.row)
+        self.record.waits_ahead, self.state.waits = self.state.waits, False
         zero_code, active = block.code(0), self.state.active
         motion = self._motion_of(block, zero_code)
         self.modes(block)
@@ -111,7 +112,7 @@ class Interpreter(Settings, Cycles):
             else:
                 self.move(block, motion, machine=zero_code in MACHINE_MOVES)
         self._leftovers(block, m_codes)
-        self.state.waits |= not STOPS.isdisjoint(m_codes) or EXACT_STOP_ONCE in block.groups
+        self.state.waits |= self.record.waits_ahead or not STOPS.isdisjoint(m_codes) or EXACT_STOP_ONCE in block.groups
         self.record.end_line()
         if any(code in self.dialect.ends for code in m_codes):
             self.state.motion = None

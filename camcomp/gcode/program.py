@@ -43,6 +43,8 @@ class Sites:
     feed_stated: Bools  # (n,) an F word was read since the previous motion
     modes_changed: Bools  # (n,) the line changes a mode on which the meaning of its words depends
     stops: Bools  # (n,) the line stops the program after its motion (M0, M2, ...)
+    waits_ahead: Bools  # (n,) the controller waits for something in front of the line
+    waits_in_line: Bools  # (n,) it waits for words of the line, such as G4, before the motion
     fixed: Bools  # (n,) the line has several motions or no G0..G3: not to be rewritten in place
 
     def take(self, rows: Ints) -> "Sites":

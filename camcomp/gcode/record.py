@@ -47,6 +47,7 @@ class Recorder:
         self.feed_stated = False
         self.modes_changed = False
         self.stops = False
+        self.waits_ahead = False
         self.oriented: str | None = None  # form of the orientation words, once there are some
         self._fixed: list[int] = []
         self.modes: list[PathMode] = []  # by motion
@@ -157,13 +158,14 @@ class Recorder:
         )
         for axis in moved:
             flags |= 1 << 8 + axis
+        waits = self.waits_ahead | state.waits << 1
         self._numbers.extend((block.row, kind, code, *state.position, *end, *centre, angle, feed))
         modal = math.nan if state.feed is None else state.feed
         self._numbers.extend((state.speed, state.tool, state.unit, *state.offset))
-        self._numbers.extend((state.plane, state.feed_mode, flags, modal, state.sense, state.waits, state.feed_unit))
+        self._numbers.extend((state.plane, state.feed_mode, flags, modal, state.sense, waits, state.feed_unit))
         self._numbers.extend((*state.turned, *state.turns_to))
         state.turned = state.turns_to
-        state.waits = False
+        self.waits_ahead = state.waits = False
         base = int(self._starts[block.row])
         words = block.words
         for k, letter in enumerate((*LETTERS[:9], *orientation.LETTERS[state.orientation_form])):
@@ -259,6 +261,8 @@ class Recorder:
             feed_stated=frozen((flags & 32) > 0, np.bool_),
             modes_changed=frozen((flags & 64) > 0, np.bool_),
             stops=frozen((flags & 128) > 0, np.bool_),
+            waits_ahead=frozen(a[:, 25] % 2.0 == 1.0, np.bool_),
+            waits_in_line=frozen(a[:, 25] >= 2.0, np.bool_),
             fixed=frozen(fixed, np.bool_),
         )
         return path, sites

@@ -232,6 +232,7 @@ class RobotReader:
             plane=frozen(np.full(n, 17), np.int8), feed_mode=frozen(np.full(n, 94), np.int8), modal_feed=frozen(m.feed),
             moved=frozen(np.ones((n, 3)), np.bool_), code_stated=frozen(no, np.bool_), feed_stated=frozen(no, np.bool_),
             modes_changed=frozen(no, np.bool_), stops=frozen(no, np.bool_), fixed=frozen(no, np.bool_),
+            waits_ahead=frozen(self._waits, np.bool_), waits_in_line=frozen(no, np.bool_),
         )  # fmt: skip
 
 

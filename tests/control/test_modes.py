@@ -244,6 +244,17 @@ def test_long_programs_wait_as_long(monkeypatch, orthoglide):
     assert with_waits.after - without.after == pytest.approx(10.5)
 
 
+@pytest.mark.parametrize("cut", ["G4 P0.1 G1 X7", "G4 P0.1\nX7", "S9000 X7", "G91 S9000 G1 X1\nG90"])
+def test_the_control_waits_where_the_written_program_says(orthoglide, cut):
+    """A joining line in front of a block with a dwell comes before the dwell, behind a dwell of its own after it."""
+    done = compensated(orthoglide, ["G0 X0 Y0 Z3", "G1 X5 F100", "X6 Y1", *cut.split("\n"), "Z5"], arcs=False)
+    assert done.rows.joining.any()
+    text = program_of(done.written.data, "out.nc", orthoglide.config)
+    assert done.control.written.waits.tolist() == np.asarray(text.path.waits).tolist()
+    told, mine = verify(text, done.program, orthoglide).figures(1.0), Totals.of(done, orthoglide).summary()
+    assert told.under_control.max_um == pytest.approx(mine.under_control.max_um, rel=0.01)
+
+
 @pytest.mark.parametrize("mode", ["G61", "G64 P0.01"])
 def test_verify_repeats_what_the_control_makes_of_it(orthoglide, mode):
     """Its points lie closer than those of the summary and count the residual across the path only."""

@@ -60,7 +60,7 @@ class LinearRun:
             offset=np.tile(state.offset, (n, 1)), relative=none, centre_absolute=np.full(n, state.centre_absolute),
             code=linear.kind, plane=np.full(n, state.plane, np.int8), feed_mode=np.full(n, state.feed_mode, np.int8),
             modal_feed=linear.feed, moved=there[:, :3], code_stated=linear.code_stated, feed_stated=linear.feed_stated,
-            modes_changed=none, stops=none, fixed=none,
+            modes_changed=none, stops=none, waits_ahead=np.asarray(self.path.waits), waits_in_line=none, fixed=none,
         )  # fmt: skip
 
     @property

@@ -282,13 +282,24 @@ def written_moves(program: Program, job: Job, rows: CorrectedRows, written: Rewr
     angle[bent] = arcs_out.stated_sweeps(start[bent], end[bent], centre[bent], axis[bent], angle[bent])
     exact, stop, tolerance, merged = mode_columns(program.modes)
     told = np.where(np.isnan(written.feed), feed, written.feed)
-    waits = np.asarray(path.waits)[motion] & (np.diff(motion, prepend=-1) > 0)
     return ToolMoves(
         kind=np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64), start=start, end=end,
-        centre=centre, axis=axis, angle=angle, feed=told, exact=exact[motion] | rest, waits=waits,
+        centre=centre, axis=axis, angle=angle, feed=told, exact=exact[motion] | rest, waits=_waits(program, rows),
         stop=(stop | path.machine)[motion], tolerance=tolerance[motion], merge=merged[motion],
         per_turn=program.per_turn[motion],
     )  # fmt: skip
+
+
+def _waits(program: Program, rows: CorrectedRows) -> Bools:
+    """Moves (N,) before which the controller waits: joining lines stand in front of the line of their motion or behind it."""
+    motion, sites = rows.motion, program.sites
+    first, last = np.diff(motion, prepend=-1) > 0, np.diff(motion, append=len(sites.row)) > 0
+    own = np.flatnonzero(~rows.joining)
+    at_line = np.zeros(len(motion), np.bool_)
+    at_line[own[np.diff(motion[own], prepend=-1) > 0]] = True
+    at_line = np.where(sites.stops[motion], last, np.where(sites.modes_changed[motion], first, at_line))
+    out: Bools = sites.waits_ahead[motion] & first | sites.waits_in_line[motion] & at_line
+    return out
 
 
 def of_text(
