@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import BinaryIO
 
-import numpy as np
-
 from camcomp.compensation.long.linear_run import LinearRun
 from camcomp.compensation.long.runs import InterpretedRun, Runs
 from camcomp.gcode.setup import Setup
 from camcomp.ground.datatypes import RAPID, Path
-from camcomp.ground.errors import Location, ProgramError, raise_all
+from camcomp.ground.errors import Location
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.job import Job
-from camcomp.model.stock.follow import refuse_untouched
+from camcomp.model.stock.follow import refuse_crashes, refuse_untouched
 from camcomp.model.stock.from_config import Bounds, memory_of
 from camcomp.model.stock.memory import StockMemory
 from camcomp.model.stock.tool_frame import tool_frame_of
@@ -29,12 +27,10 @@ class FollowedRuns:
     memory: StockMemory
 
     @classmethod
-    def of(cls, job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRuns | None:
-        """Set up the stock, reading the program where the stock depends on its bounds or tools; None without a stock."""
-        stock = job.config.workpiece.stock
-        if stock is None:
-            return None
-        bounds = Bounds()
+    def of(cls, job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRuns:
+        """Set up the stock, reading the program where the stock depends on its bounds or tools."""
+        stock, bounds = job.config.workpiece.stock, Bounds()
+        assert stock is not None
         if stock.type == "program" or job.config.tools:
             runs = Runs(source=source, name=name, setup=setup, dialect=job.config.control.dialect)
             for run in runs:
@@ -55,9 +51,7 @@ class FollowedRuns:
         """
         both = path if ahead is None else Path.joined([path, ahead])
         found, crashes = self.memory.follow(both, ahead=0 if ahead is None else len(ahead))
-        text = "the rapid goes through material of the stock"
-        lines = np.unique(path.line[crashes]).tolist()
-        raise_all([ProgramError("CC142", f"line {n}: {text}", at=Location(self.name, n, 1)) for n in lines[:20]])
+        refuse_crashes(path, crashes, lambda line: Location(self.name, line, 1))
         return found.of_motions(0, len(path)), found.of_motions(len(path), len(both))
 
     def finish(self) -> None:

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from camcomp.compensation.long.answers import with_answers
-from camcomp.compensation.long.engagement import RunEngagement
 from camcomp.compensation.long.linear_run import LinearRun, NotInPieces
 from camcomp.compensation.long.proof import Sample
 from camcomp.compensation.long.runs import InterpretedRun, Runs
@@ -155,14 +154,13 @@ class LongProgram:
         first = int(before is not None)
         part = Part(first, first + len(piece.path), self._output)
         program = piece.between(before, after)
-        engaged = self._engagement_of(piece, before, after)
         here, minutes = piece.run.row0 / self._lines, minutes_of(self.job, program.path)
         began = self._minutes - float(minutes[:first].sum())
         self._minutes += float(minutes[part.first : part.last].sum())
         with part_of_work(here, here):
             result = compensate(
                 program, job, method="newton", tolerance_um=self.tolerance_um, version=self.version, part=part,
-                arcs=self.arcs, began_min=began, engaged=None if engaged is None else Engaged.joined(engaged.parts(0, first, len(program.path) - 1)),
+                arcs=self.arcs, began_min=began, engaged=self._engagement_of(piece, before, after),
             )  # fmt: skip
         self._feeds.add(piece.path)
         own = slice(*np.searchsorted(result.rows.motion, (part.first, part.last)).tolist())
@@ -178,15 +176,18 @@ class LongProgram:
         self._tell(tell)
         return result.written.data
 
-    def _engagement_of(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> RunEngagement | None:
-        """Engagement of the tool on a piece and next to it."""
+    def _engagement_of(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> Engaged | None:
+        """Engagement on a piece, at the end of the motion in front of it, and at the begin of that behind it."""
         if piece.engaged is None:
             return None
-        ends = ((before, before.ends[1] if before else 0), (after, after.ends[0] if after else 0))
-        last, first = (
-            None if each is None or each.engaged is None else each.engaged.of_motions(k, k + 1) for each, k in ends
-        )
-        return RunEngagement(piece.engaged, last, first)
+        first = int(before is not None)
+        parts = [replace(piece.engaged, motion=piece.engaged.motion + first)]
+        if before is not None and before.engaged is not None:
+            parts.insert(0, _still(before.engaged.of_motions(before.ends[1], before.ends[1] + 1), -1, 0))
+        if after is not None and after.engaged is not None:
+            behind = first + len(piece.path)
+            parts.append(_still(after.engaged.of_motions(after.ends[0], after.ends[0] + 1), 0, behind))
+        return Engaged.joined(parts)
 
     def _tell(self, batch: Callable[[], JointTableRows]) -> None:
         """Add up a piece and pass on its rows while the next piece is computed; one piece at a time, in order."""
@@ -241,6 +242,14 @@ class _Piece:
     def modes(self) -> tuple[PathMode, ...]:
         """Path mode of every motion."""
         return self._program.modes
+
+
+def _still(engaged: Engaged, row: int, motion: int) -> Engaged:
+    """The constant engagement of one row all along a motion."""
+    if not len(engaged.u):
+        return engaged
+    out = engaged.take(np.array([row % len(engaged.u)] * 2))
+    return replace(out, motion=np.array([motion, motion]), u=np.array([0.0, 1.0]), bends=np.ones(2, np.bool_))
 
 
 def _straight(path: Path, k: int, u: float) -> Path:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from camcomp.gcode.program import Program
@@ -28,17 +30,17 @@ def followed(
     frame = tool_frame_of(config, tool_axis, path)
     memory = memory_of(config, frame, Bounds().add(path))
     engaged, crashes = memory.follow(frame.turned(path))
-    refuse_crashes(path, crashes, program)
+    refuse_crashes(path, crashes, None if program is None else lambda line: program.text.place(line - 1, 0))
     refuse_untouched(config, memory)
     return engaged, memory
 
 
-def refuse_crashes(path: Path, crashes: Ints, program: Program | None) -> None:
-    """Raise ProgramError CC142 for rapids that move through material."""
+def refuse_crashes(path: Path, crashes: Ints, place: Callable[[int], Location] | None) -> None:
+    """Raise ProgramError CC142 for rapids that move through material. place: of source lines, from 1."""
     errors = []
     for line in np.unique(path.line[crashes])[:MOST_ERRORS].tolist():
-        at: Location | None = program.text.place(line - 1, 0) if program is not None else None
-        errors.append(ProgramError("CC142", f"line {line}: the rapid goes through material of the stock", at=at))
+        text = f"line {line}: the rapid goes through material of the stock"
+        errors.append(ProgramError("CC142", text, at=None if place is None else place(line)))
     raise_all(errors)
 
 
