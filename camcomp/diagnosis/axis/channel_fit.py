@@ -81,7 +81,7 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
         sd = _noise(data, responses)
         linear = _explained(data, terms, responses, sd)
         members = linear.found.members
-        amount = _amounts(linear, terms)
+        amount = _by_term(linear.found.amplitudes()[0], terms)
         moved = [amount[i] if i in members else np.zeros(len(t.parameters)) for i, t in enumerate(terms)]
         same = all(np.allclose(a, b, rtol=1e-3, atol=1e-6) for a, b in zip(at, moved, strict=True))
         late = data.clock > 0.0 and again == 0  # rows may be late without any cause, too
@@ -108,7 +108,7 @@ def _without_needless(
 
     while linear.found.members:
         own = [terms[i] for i in linear.found.members]
-        amount = _amounts(linear, terms)
+        amount = _by_term(linear.found.amplitudes()[0], terms)
         at = [amount[i] for i in linear.found.members]
         every = tuple(range(len(own)))
         sets = [every, *(tuple(i for i in every if i != out) for out in every)]
@@ -136,7 +136,7 @@ def _settled(
     for again in range(PASSES):
         responses = [_columns(data, terms, k, at) for k in range(len(data.values))]
         linear = _explained(data, terms, responses, sd, on)
-        amount = _amounts(linear, terms)
+        amount = _by_term(linear.found.amplitudes()[0], terms)
         if again < PASSES - 1:
             at = [amount[i] if i in on else each for i, each in enumerate(at)]
     return linear
@@ -291,12 +291,9 @@ def _ends(data: ChannelData) -> dict[str, tuple[float, float]]:
     return out
 
 
-def _amounts(linear: _Linear, terms: Sequence[AxisCause]) -> list[Floats]:
-    mean = linear.found.amplitudes()[0]
-    start, out = 0, []
-    for term in terms:
-        out.append(mean[start : (start := start + len(term.parameters))])
-    return out
+def _by_term(values: Floats, terms: Sequence[AxisCause]) -> list[Floats]:
+    """Values of all effect columns, and perhaps of others behind them, as those of every term (d,)."""
+    return np.split(values, np.cumsum([len(term.parameters) for term in terms]))[: len(terms)]
 
 
 def _left(
@@ -309,8 +306,8 @@ def _left(
     found, model = linear.found, linear.model
     mean = model.posterior(found.background, found.data.slab(found.members)).mean
     sizes = {kind: unit * mean[model.layout.covariates[kind]] for kind, unit in linear.unit.items()}
-    errors = [small * mean[list(c.columns)] for c in model.candidates]
-    amount = [a if i in found.members else errors[i] for i, a in enumerate(_amounts(linear, terms))]
+    errors = _by_term(small * mean, terms)
+    amount = [a if i in found.members else errors[i] for i, a in enumerate(_by_term(found.amplitudes()[0], terms))]
     left = []
     for k, y in enumerate(data.values):
         part = data.response(k, [(t, a) for t, a in zip(terms, amount, strict=True) if a.any()])
@@ -320,7 +317,7 @@ def _left(
 
 def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: float) -> ChannelFit:
     found, model = linear.found, linear.model
-    covariance = found.amplitudes()[1]
+    deviation = _by_term(np.sqrt(np.diag(found.amplitudes()[1])), terms)
     at = model.posterior(found.background, found.data.slab(found.members))
     slots = {kind: np.arange(model.layout.size)[model.layout.covariates[kind]] for kind in linear.unit}
     every, units = np.concatenate([*slots.values()]), np.concatenate([*linear.unit.values()])
@@ -332,13 +329,13 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     gains = _gains_of_functions(data, linear, left, sd)
     whole = sum(float(np.sum((data.values[k] - data.level) ** 2)) for k in data.train)
     for i in found.members:
-        term, columns = terms[i], list(model.candidates[i].columns)
+        term = terms[i]
         own = [data.response(k, [(term, amount[i])]) for k in data.train]
         if float(np.mean(np.concatenate(own) ** 2)) < (MINOR * data.floor) ** 2:
             continue  # as large as on every healthy machine
         less = sum(float(np.sum((left[k] + each) ** 2)) for k, each in zip(data.train, own, strict=True))
         rest = sum(float(np.sum(left[k] ** 2)) for k in data.train)
-        half = 1.96 * scale.interval * np.sqrt(np.diag(covariance)[columns]) + KNOWN * np.abs(amount[i])
+        half = 1.96 * scale.interval * deviation[i] + KNOWN * np.abs(amount[i])
         acting.append((term, amount[i]))
         imitated.append(
             _no_imitation(
@@ -424,12 +421,12 @@ def _share_of(linear: _Linear, name: str, left: Sequence[Floats], sd: float) -> 
 
 
 def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[str, float]) -> dict[str, Estimate]:
-    """Parameters as the effect's file has them; shapes that were fitted with the deviation of a fit around them."""
+    """Parameters that show as the effect's file has them; shapes that were fitted with the deviation of a fit around them."""
     out: dict[str, Estimate] = {}
     values = term.cause(amount.tolist()).values
     for p, a, h in zip(term.parameters, amount.tolist(), half.tolist(), strict=True):
         low, value, high = (p.value(each * p.scale) for each in (a - h, a, a + h))
-        if p.name in values:
+        if p.name in values and h > 0.0:
             out[p.name] = Estimate.stated(value, low, high)
     if hasattr(term.module, "public"):
         ends = [term.cause(np.maximum(amount + sign * half, 0.0).tolist()).values for sign in (-1.0, 0.0, 1.0)]
