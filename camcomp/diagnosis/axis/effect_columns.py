@@ -34,9 +34,10 @@ ChannelName = Literal["following", "behind", "force"]
 # of standing poses; of an interval that is searched; laws; a zero of an encoder
 ELSEWHERE = ("joint_hysteresis", "joint_curve", "disturbance", "formula", "map", "joint_offset")
 
+# Parameters of friction beside its Coulomb force, by hinge: with the speed, and with its size; then the force that standstill
+# adds, and the speed that ends it.
 DRAG = {False: ("viscous_Ns_per_mm", "asymmetry_Ns_per_mm"), True: ("viscous_Nmms_per_rad", "asymmetry_Nmms_per_rad")}
 STRIBECK = {False: ("stribeck_N", "stribeck_mm_per_s"), True: ("stribeck_Nmm", "stribeck_rad_per_s")}
-# of friction, by hinge: with the speed, and with its size; the force at standstill, and the speed that ends it
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
