@@ -2,9 +2,9 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 from camcomp.gcode.stated import INCH_MM, Comment, OpenStatement, StatedTool, Statement, cutter, numbers, read_each
+from camcomp.ground.records import replace
 
 TITLE = "Vectric (End Mill {6 mm})"
 MARKS = (b"END MILL", b"BALL NOSE", b"MATERIAL SIZE")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -12,6 +11,7 @@ from camcomp.compensation.program.result import Summary, interpolation_failed
 from camcomp.compensation.report.tables import JointTable
 from camcomp.ground.errors import ProgramError
 from camcomp.ground.files import writing
+from camcomp.ground.records import dataclass
 from camcomp.model.job import Job
 from camcomp.model.signal_path import has_memory
 from camcomp.model.statics.masses import has_moved_mass

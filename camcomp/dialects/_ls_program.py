@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from camcomp.gcode.path_mode import PathMode
@@ -11,6 +10,7 @@ from camcomp.gcode.robot_language import MoveSite
 from camcomp.gcode.robot_reader import EXACT, RobotReader
 from camcomp.ground.datatypes import ARC, LINE, RAPID
 from camcomp.ground.errors import ProgramError, raise_all
+from camcomp.ground.records import dataclass
 
 JOINTS = ("J1", "J2", "J3", "J4", "J5", "J6")
 _SECTION = re.compile(r"^[ \t]*/(MN|POS|END)[ \t\r]*$", re.MULTILINE | re.IGNORECASE)

@@ -1,7 +1,6 @@
 """Statements of a RAPID module, executed in order; the source is that of the dialect."""
 
 import re
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from camcomp.gcode.robot_reader import EXACT, RobotReader
 from camcomp.ground.datatypes import ARC, LINE, RAPID
 from camcomp.ground.errors import ProgramError, raise_all
 from camcomp.ground.orientation import rotations_of_quaternions
+from camcomp.ground.records import dataclass
 
 MODULE = re.compile(r"\s*MODULE\s+\w+", re.IGNORECASE)
 FASTEST_ZONE_MM = {0: 0.3}  # z0; zN is a zone of N mm

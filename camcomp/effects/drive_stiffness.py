@@ -1,8 +1,8 @@
 """The drive spring (screw, nut, bearings) is softer or stiffer than stated."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
+from camcomp.ground.records import replace
 from camcomp.model.effect import Parameter
 from camcomp.model.statics.description import Actuator, Robot
 

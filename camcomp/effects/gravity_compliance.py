@@ -1,8 +1,8 @@
 """A joint of an arm gives way under the arm's own weight, more than the model says (a model without springs: at all)."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
+from camcomp.ground.records import replace
 from camcomp.model.effect import Parameter
 from camcomp.model.statics.description import Actuator, Robot
 

@@ -1,8 +1,8 @@
 """All links (feet, bars) are softer or stiffer than stated, by one factor: material, wall, joints between them."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
+from camcomp.ground.records import replace
 from camcomp.model.effect import Parameter
 from camcomp.model.statics.description import Link, Parallelogram, Robot
 

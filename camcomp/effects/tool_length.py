@@ -1,10 +1,10 @@
 """The tool is longer than stated: the tip stands further out along the tool vector."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
+from camcomp.ground.records import replace
 from camcomp.model.effect import Parameter
 from camcomp.model.statics.description import Robot
 

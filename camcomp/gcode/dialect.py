@@ -2,12 +2,12 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from camcomp.gcode.codes import ENDS, GROUPS, REFUSED
 from camcomp.gcode.numbers import decimals
 from camcomp.gcode.spelling import Spelling
+from camcomp.ground.records import dataclass, field
 
 if TYPE_CHECKING:
     from camcomp.gcode.robot_language import RobotLanguage

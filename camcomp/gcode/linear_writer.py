@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +12,8 @@ from camcomp.gcode.output import Output
 from camcomp.gcode.path_mode import numbered
 from camcomp.gcode.program import LETTERS, LINEAR_LETTERS, Program
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
+from camcomp.ground.records import dataclass
+from camcomp.ground.vectors import distinct
 
 TIE = 1e-6  # of the last digit: nearer to a tie than this, two ways of rounding may differ
 _TENS = 10.0 ** np.arange(18)
@@ -92,9 +93,9 @@ class LinearWriter:
         """Rows (N,) with a number that lies half-way between two that can be written."""
         sites, motion = self.program.sites, self.out.motion
         scaled = np.empty(self.out.end.shape)
-        for unit in np.unique(sites.unit):
+        for unit in distinct(sites.unit):
             at = sites.unit[motion] == unit
-            digits = self.program.language.digits(self.resolution, float(unit))
+            digits = self.program.language.digits(self.resolution, unit)
             scaled[at] = (self.out.end[at] - sites.offset[motion[at]]) / unit * 10.0**digits
         feed = np.where(np.isnan(self.out.feed), self.program.path.feed[motion], self.out.feed)
         feed = np.where(feed > 0.0, feed / sites.unit[motion], 1.0)

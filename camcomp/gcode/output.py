@@ -1,12 +1,11 @@
 """Requested moves of a corrected program, and the result of writing them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from camcomp.gcode.path_mode import PathMode
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path, frozen
+from camcomp.ground.records import dataclass
 
 FEED_SLACK = 1.0e-3  # relative difference of a feed below which no F word is written
 

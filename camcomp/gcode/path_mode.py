@@ -2,13 +2,13 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from camcomp.gcode.codes import EXACT_STOPS, code_name
 from camcomp.ground.datatypes import Ints
+from camcomp.ground.records import dataclass, replace
 
 NUMBER = r"\d+(?:\.\d*)?|\.\d+"
 ROUNDING_DISTANCE = 6410  # Sinumerik: corners are blended from ADIS mm before them on

@@ -1,7 +1,5 @@
 """Result of reading a program: its path, and the positions of its numbers in the text."""
 
-from dataclasses import dataclass, fields
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +10,8 @@ from camcomp.gcode.robot_language import MoveSite
 from camcomp.gcode.setup import Setup, Triple
 from camcomp.gcode.text import Text
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.records import dataclass, fields
+from camcomp.ground.vectors import distinct
 
 # Columns of Sites.begin and Sites.finish.
 X, Y, Z, I, J, K, R, F, P, A, B, C, G = range(13)
@@ -92,6 +92,4 @@ class Program:
 
     def step_mm(self, resolution_mm: float) -> float:
         """Coarsest step of its lengths (mm) for a controller of this resolution."""
-        return max(
-            self.language.step_mm(resolution_mm, float(each)) for each in np.unique(np.append(self.sites.unit, 1.0))
-        )
+        return max(self.language.step_mm(resolution_mm, each) for each in {1.0, *distinct(self.sites.unit)})

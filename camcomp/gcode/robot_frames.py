@@ -8,12 +8,12 @@ orientation in the words of `ground.orientation`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.orientation import RPY, rotations_of
+from camcomp.ground.records import dataclass, field
 
 SAME_TIP_MM = 0.1  # between the tool of a program and that of the machine file
 

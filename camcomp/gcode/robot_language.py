@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass, field
 
 if TYPE_CHECKING:
     from camcomp.gcode.robot_frames import CoordinateFrame

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.robot_frames import RobotFrames
+from camcomp.ground.records import dataclass, field
 
 Triple = tuple[float, float, float]
 ASSUMED = PathMode(stated=False)

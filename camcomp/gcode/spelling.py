@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+
+from camcomp.ground.records import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,10 +9,10 @@ from __future__ import annotations
 import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any, BinaryIO
 
 from camcomp.ground import shelf
+from camcomp.ground.records import dataclass, field, replace
 
 CHUNK = 1 << 16  # bytes read at once
 MOVES = b"0123456789.+-XYZGFN \r\n\t"  # characters of linear moves

@@ -5,13 +5,13 @@ as one character per byte, which is lossless; only UTF-16 is decoded.
 """
 
 import re
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from camcomp.ground.datatypes import Ints
 from camcomp.ground.errors import Location, ProgramError
+from camcomp.ground.records import dataclass
 
 END_OF_LINE = r"\r{0,3}\n|\r"  # LF, CR LF and CR, and the CR CR LF of files that were converted twice
 _END = re.compile(END_OF_LINE)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 
 from camcomp.gcode.words import code_of
 from camcomp.ground.datatypes import RAPID, Bools, Path
+from camcomp.ground.records import dataclass, field
 
 RULE = "CC146"
 BEFORE_XYZ = "come before X, Y and Z have all been commanded"

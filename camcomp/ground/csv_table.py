@@ -11,7 +11,6 @@ import csv
 import io
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
@@ -19,6 +18,7 @@ import numpy as np
 from camcomp.ground.bounds import number_of
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import CamcompError, ConfigError, Location
+from camcomp.ground.records import dataclass
 
 MOST_TABLE_ROWS = 5_000_000  # more than an hour at 1 kHz
 MOST_TABLE_BYTES = 1 << 30

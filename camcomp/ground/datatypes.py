@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from camcomp.ground.orientation import Orientation
+from camcomp.ground.records import dataclass, fields
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

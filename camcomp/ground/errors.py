@@ -5,9 +5,9 @@ Several errors of one file are raised together: the first one carries the `other
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
+from camcomp.ground.records import dataclass
 from camcomp.ground.rules import RULES
 
 

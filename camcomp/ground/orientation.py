@@ -12,10 +12,10 @@ Sources: LinuxCNC, posemath, pmRpyMatConvert; Siemens, Sinumerik 840D sl Job Pla
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+
+from camcomp.ground.records import dataclass
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

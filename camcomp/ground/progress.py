@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import TypeVar
+
+from camcomp.ground.records import dataclass
 
 T = TypeVar("T")
 COMPILING, ONCE = "compiling", "compiling, once per installation"

@@ -1,8 +1,15 @@
-"""Lengths and products of many short vectors."""
+"""Lengths and products of many short vectors, and distinct values."""
+
+from typing import Any
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
+
+
+def distinct(values: np.ndarray) -> list[Any]:
+    """The different values (n,), ascending; unlike numpy's unique without the import of masked arrays."""
+    return sorted(set(values.tolist()))
 
 
 def sizes(vectors: Floats) -> Floats:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from camcomp.gcode.stated import INCH_MM
 from camcomp.gcode.text import Text
 from camcomp.ground.errors import Location, ProgramError
 from camcomp.ground.files import display_name, read_bytes
+from camcomp.ground.records import replace
 from camcomp.model.config.spec import Config
 from camcomp.model.config.stated import dialect_without_config
 from camcomp.model.robot_frames import robot_frames

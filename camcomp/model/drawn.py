@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.config.load import varied
 from camcomp.model.config.spread import UncertainInput, uncertain_inputs
 from camcomp.model.job import Frame, Job

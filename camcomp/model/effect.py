@@ -5,7 +5,6 @@ camcomp/model/signal_path.py calls the hooks, stage by stage, effects in the ord
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, Literal, Self
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import Location
+from camcomp.ground.records import dataclass, field, replace
 from camcomp.model.seams import Seams
 from camcomp.model.statics.masses import MassLoads
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from io import BytesIO
 from typing import Any, BinaryIO, Literal
 
 from camcomp.gcode.stated import INCH_MM, Stated, StatedMaterial, StatedStock, StatedTool, read_stated
 from camcomp.ground.errors import Location, ProgramError
+from camcomp.ground.records import replace
 from camcomp.model.config.cutting_tool import BoxStock, CommentsStock, Cutter, CylinderStock, ProgramStock, Stock
 from camcomp.model.config.spec import Config
 from camcomp.model.config.taken import TakenFromProgram

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path as FilePath
 from typing import Any
@@ -16,6 +15,7 @@ from camcomp.gcode.program import Program
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats, Path
 from camcomp.ground.errors import ConfigError, PhysicsError
+from camcomp.ground.records import dataclass, field, replace
 from camcomp.model import signal_path
 from camcomp.model.config.spec import Config
 from camcomp.model.config.taken import TakenFromProgram

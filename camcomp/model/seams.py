@@ -1,10 +1,9 @@
 """Seams of a recording: its start in motion, and its continuations after missing rows."""
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.records import dataclass, replace
 
 _MISSING = 1.5  # of the median time step: longer steps mean missing rows
 

@@ -7,7 +7,6 @@ structure themselves and call these functions for the hooks. Each applies one st
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import PhysicsError
+from camcomp.ground.records import replace
 from camcomp.model.axes import axes_of
 from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.statics.description import Robot

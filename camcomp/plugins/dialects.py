@@ -2,12 +2,12 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import fields
 from types import ModuleType
 from typing import Any, Protocol
 
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.spelling import Spelling
+from camcomp.ground.records import fields
 from camcomp.plugins.contract import check_functions, check_module, check_names, described, refusal
 
 FLOWS = ("", "o-words", "macro", "sinumerik")

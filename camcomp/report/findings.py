@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
 from camcomp.ground.errors import CamcompError, CheckFailed
 from camcomp.ground.places import STANDARD
+from camcomp.ground.records import dataclass, field
 
 WARNING = "warning"  # rule of all warnings, which have no ids of their own
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import PurePath
 
+from camcomp.ground.records import dataclass
 from camcomp.report.page import Section, Table
 
 

@@ -10,7 +10,6 @@ import gzip
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from functools import cache
 from html import escape
 from importlib.resources import files
@@ -18,6 +17,7 @@ from itertools import zip_longest
 
 from camcomp import __version__
 from camcomp.ground.errors import ConfigError
+from camcomp.ground.records import dataclass, field
 from camcomp.report.plot import Figure
 
 # The browser enforces that scripts and styles come from this file only.

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.records import dataclass, field
 
 MOST_POINTS = 3000  # points kept of a long curve
 # Curves differ by dash as well as by colour, so that a print in grey can be read.

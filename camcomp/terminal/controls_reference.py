@@ -7,7 +7,6 @@ Sources of the programs: LinuxCNC 2.9 user manual, Fanuc 30i operator's manual, 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 
 from camcomp.gcode.codes import GROUPS, REFUSED, code_name
 from camcomp.gcode.dialect import Dialect
@@ -15,6 +14,7 @@ from camcomp.gcode.interpret import read_program
 from camcomp.gcode.setup import Setup
 from camcomp.ground import shelf
 from camcomp.ground.errors import ProgramError
+from camcomp.ground.records import dataclass, field
 
 CONTROLS = {"rs274": "LinuxCNC, RS274", "fanuc": "Fanuc, Haas, Mazak EIA", "sinumerik": "Sinumerik", "grbl": "Grbl"}
 READ, NOT_THERE = "read", "-"

@@ -6,13 +6,13 @@ Source: FreeCAD's files `Tools/Library/Default.fctl` and `Tools/Bit/*.fctb`. A l
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 from camcomp.gcode.stated import INCH_MM
 from camcomp.ground.bounds import number_of
 from camcomp.ground.errors import FileError
 from camcomp.ground.files import read_bytes
+from camcomp.ground.records import replace
 from camcomp.model.config.tool_table import TabledTool, ToolFile, refused
 from camcomp.model.config.yaml_tree import Node, child, read_tree
 

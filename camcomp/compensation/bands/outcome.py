@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from camcomp.compensation.bands.scatter import LEVEL, TipMoves, gained, size_below
 from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.records import dataclass
 from camcomp.model.config.spread import UncertainInput
 from camcomp.model.drawn import UncertainJob
 

@@ -6,13 +6,13 @@ order, without products of two inputs, the loaded tip then moves by slope z + be
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from statistics import NormalDist
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass
 
 LEVEL = 0.95  # of the machines drawn: what a band promises
 LEAST_BETTER = 0.995  # of the machines drawn are not worse off by a share of the correction than without it

@@ -7,7 +7,6 @@ need a hundredth of their size, so low polynomials do where corrections need til
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from camcomp.compensation.bands.scatter import TipMoves
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.errors import PhysicsError
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.drawn import UncertainJob, uncertain_jobs
 from camcomp.model.job import Job
 from camcomp.model.statics.machine import Machine

@@ -9,7 +9,6 @@ import os
 import pickle
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from camcomp.gcode.detect import endings
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, format_error
 from camcomp.ground.files import alone_in, display_name, read_bytes, write_all
 from camcomp.ground.places import one_place_each
+from camcomp.ground.records import dataclass, field
 from camcomp.model.config.spec import Config
 from camcomp.model.config.yaml_tree import leaves, plain
 from camcomp.model.from_program import StockChoice

@@ -8,7 +8,6 @@ import pickle
 import signal
 import threading
 import warnings
-from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ from camcomp.ground.garbage import collect_seldom
 from camcomp.ground.notes import held, hold
 from camcomp.ground.old_names import keep_old_names
 from camcomp.ground.progress import watched
+from camcomp.ground.records import dataclass, field
 
 if TYPE_CHECKING:
     from camcomp.compensation.program.totals import Totals

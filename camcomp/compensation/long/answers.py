@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from camcomp.compensation.program.compensate import Compensated, compensate
 from camcomp.compensation.program.result import Interpolation
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.records import dataclass, fields, replace
 from camcomp.model.job import Job
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.solve import FREE, TARGET, State, inverse, solve

@@ -11,7 +11,6 @@ The cubes depend on the machine, the range of forces and the origin of the progr
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -31,6 +30,7 @@ from camcomp.compensation.long.kernel import (
 )
 from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.solve import FREE, TARGET, solve, threads
 

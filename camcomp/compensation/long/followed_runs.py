@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import BinaryIO
 
 from camcomp.compensation.long.linear_run import LinearRun
@@ -10,6 +9,7 @@ from camcomp.compensation.long.runs import InterpretedRun, Runs
 from camcomp.gcode.setup import Setup
 from camcomp.ground.datatypes import RAPID, Path
 from camcomp.ground.errors import Location
+from camcomp.ground.records import dataclass
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.job import Job
 from camcomp.model.stock.follow import refuse_crashes, refuse_untouched

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +10,7 @@ from camcomp.gcode.linear_lines import LinearMotions
 from camcomp.gcode.program import LETTERS, LINEAR_LETTERS, Sites
 from camcomp.gcode.state import ControlState
 from camcomp.ground.datatypes import RAPID, Path
+from camcomp.ground.records import dataclass
 
 
 class NotInPieces(Exception):

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
@@ -34,6 +33,7 @@ from camcomp.ground.datatypes import LINE, RAPID, Path
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.progress import done
 from camcomp.ground.progress import part as part_of_work
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.job import Job
 

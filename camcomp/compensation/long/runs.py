@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
 from typing import BinaryIO
 
 import numpy as np
@@ -25,6 +24,7 @@ from camcomp.gcode.text import END_OF_LINE, Text
 from camcomp.gcode.uncorrected import behind_end_warning, has_motion
 from camcomp.gcode.words import points_in_feeds
 from camcomp.ground.errors import Location, ProgramError
+from camcomp.ground.records import dataclass, field, replace
 from camcomp.model.config.spec import Config
 from camcomp.model.control import waiting_s
 

@@ -9,7 +9,6 @@ then two rounds of half the step about the best one.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
 
@@ -22,6 +21,7 @@ from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, progress
 from camcomp.ground.datatypes import RAPID, Path
 from camcomp.ground.errors import CamcompError
+from camcomp.ground.records import dataclass, replace
 from camcomp.ground.result import Result, Size
 from camcomp.model.config.load import overridden
 from camcomp.model.config.robot import PrismaticActuator

@@ -7,13 +7,12 @@ curvature changes within a part is of third order and is left to the check of th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.compensation.program.chords import SHARE, Nodes, divide
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, Bools, Floats, Ints
+from camcomp.ground.records import dataclass
 from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 

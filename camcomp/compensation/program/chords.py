@@ -7,11 +7,10 @@ are the fewest. The two end steps of a piece keep one end in place and are END_S
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.records import dataclass
 from camcomp.ground.vectors import sizes
 
 END_STEP = 0.85  # largest miss of an end step = that of an inner one (0.062 against 0.0625 of |x''| h^2)

@@ -6,7 +6,6 @@ bends, solve again at the division points, write, and put the written program th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -55,7 +54,8 @@ from camcomp.gcode.rewrite import rewrite
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.progress import part as part_of_work
-from camcomp.ground.vectors import sizes
+from camcomp.ground.records import dataclass, replace
+from camcomp.ground.vectors import distinct, sizes
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle
 from camcomp.model.cutting.track import Track, lay_track
@@ -404,7 +404,7 @@ class _Correction:
             force=acting_force(job, state.rho, points.travel, points.end), uncorrected=before.tip,
             before=before.error[judged], after=after.error[judged], control=control, judged=points.row[judged],
             iterations=self.aimed.iterations, method=self.method, without_spindle=still, warnings=warnings,
-            feeds=len(np.unique(track.motion[self.feeding])), moved=not self.kept[self.feeding].all(), engaged=track.engaged,
+            feeds=len(distinct(track.motion[self.feeding])), moved=not self.kept[self.feeding].all(), engaged=track.engaged,
             bands=self._bands(found, before, written), left=None if found.left is None else found.left[judged],
             orienting=self.orienting, tilt_after=None if after.tilt is None else after.tilt[judged],
             fraction=track.u(rows.piece, rows.w),

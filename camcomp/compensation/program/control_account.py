@@ -5,12 +5,11 @@ A controller looks some moves ahead: a stretch is planned with the moves that fo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-
 import numpy as np
 
 from camcomp.compensation.program.result import ErrorSum
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.records import dataclass, fields
 from camcomp.ground.source_lines import MOST_LINES, named_lines
 from camcomp.ground.vectors import sizes
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves

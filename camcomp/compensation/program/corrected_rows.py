@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +13,7 @@ from camcomp.compensation.program.moves import refuse_unsolved, row_layout, trav
 from camcomp.gcode.output import Output
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +15,7 @@ from camcomp.compensation.program.orienting import Orienting
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.path_geometry import between_ends
+from camcomp.ground.records import dataclass, fields, replace
 from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job

@@ -6,13 +6,12 @@ program leads the drive through the play in one line, which is no part of before
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.compensation.program.chords import trial_nodes
 from camcomp.compensation.program.moves import corrected_pieces, travel_of
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
+from camcomp.ground.records import dataclass
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import LEAST_MM, gives_way, load_flanks, way_per_unit, without_drives

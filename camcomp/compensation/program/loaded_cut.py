@@ -8,8 +8,6 @@ is put right in the next round.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from camcomp.compensation.program.moves import refuse_unsolved, travel_of
@@ -18,6 +16,7 @@ from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.progress import done, part
+from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.frame import lateral
 from camcomp.model.cutting.track import PLUNGE_SINE, Track, lay_track

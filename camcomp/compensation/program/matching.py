@@ -6,7 +6,6 @@ of the moves tells: those of a piece go along it, and a joining line goes from o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from camcomp.compensation.program.moves import Layout
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Floats, Ints, Path
 from camcomp.ground.errors import CheckFailed
+from camcomp.ground.records import dataclass
 from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 

@@ -8,7 +8,6 @@ Source: reference [1] of A. Klimchik, A. Pashkevich, D. Chablat, G. Hovland (201
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +20,7 @@ from camcomp.ground.datatypes import RAPID, Floats, Path
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.files import display_name, read_bytes
 from camcomp.ground.notes import note
+from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import sizes
 from camcomp.model.config.spec import ForceChoice
 from camcomp.model.effect import Cause, Load, Motion

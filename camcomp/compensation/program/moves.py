@@ -5,14 +5,13 @@ Shared by `compensate` and `verify`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
 from camcomp.ground.errors import Location, PhysicsError, raise_all
+from camcomp.ground.records import dataclass
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import AROUND_S, Travel

@@ -6,8 +6,6 @@ tip is as exact as without words, also where words say less than an orientation 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from camcomp.compensation.program.chords import Nodes
@@ -16,6 +14,7 @@ from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Bools, Floats, Ints, Path
 from camcomp.ground.errors import ConfigError, ProgramError
 from camcomp.ground.orientation import RPY, UPRIGHT, VECTOR, between
+from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job

@@ -7,7 +7,6 @@ a program can ask for it anywhere.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from camcomp.compensation.program.chords import trial_nodes
 from camcomp.compensation.program.moves import corrected_pieces, travel_of
 from camcomp.compensation.program.uncertainty import Uncertainty, same_place
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_at, respond

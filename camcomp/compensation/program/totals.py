@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from camcomp.gcode.text import count_lines
 from camcomp.gcode.uncorrected import below_step_warning
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.orientation import angles_of
+from camcomp.ground.records import dataclass
 from camcomp.ground.source_lines import MOST_LINES, named_lines
 from camcomp.ground.vectors import sizes
 from camcomp.model.control import limits_of, waiting_s

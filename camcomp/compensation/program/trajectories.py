@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass
 from camcomp.model.job import Job
 from camcomp.model.statics.target import settle
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from camcomp.compensation.bands.scatter import TipMoves
 from camcomp.compensation.bands.tip_field import of_sides, tip_field_of, unsolved
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.records import replace
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.drawn import DrawnJob
 from camcomp.model.job import Job

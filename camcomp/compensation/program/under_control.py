@@ -7,7 +7,6 @@ separately from the tip error of the written program.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +20,7 @@ from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.path_mode import PathMode, numbered
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
+from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import sizes
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job

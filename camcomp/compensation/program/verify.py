@@ -7,7 +7,6 @@ not counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +32,7 @@ from camcomp.gcode.stamp import is_stamped, stamped_model
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 from camcomp.ground.progress import part, steps
+from camcomp.ground.records import dataclass, field, replace
 from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from camcomp.compensation.program.trajectories import Trajectories
 from camcomp.compensation.program.under_control import mode_name
 from camcomp.compensation.program.verify import Verified
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
+from camcomp.ground.records import dataclass
 from camcomp.ground.vectors import sizes
 from camcomp.model.job import Job
 from camcomp.report.plot import (

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from scipy.optimize import least_squares
 
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.report.figures import DrawnPath
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass, field
 from camcomp.model.job import Job
 from camcomp.model.statics.description import Actuator, Chain, Parallelogram, Passive, Robot, Transform
 from camcomp.model.statics.rotation import exp_rotation, rotation_vectors

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from camcomp.compensation.program.loaded_cut import loaded_cut, meant_cut, nodes_of
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass
 from camcomp.model.job import Job
 from camcomp.model.stock.walls import Wall, offsets, walls_of
 from camcomp.report.page import Section

@@ -6,7 +6,6 @@ In a program of your own: `Stream(Job(load_config(["machine.yaml"]))).correct((x
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import isfinite
 from typing import NamedTuple
 
@@ -15,6 +14,7 @@ import numpy as np
 from camcomp.compensation.program.moves import RULE_OF_STATUS
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import PhysicsError
+from camcomp.ground.records import replace
 from camcomp.model import signal_path
 from camcomp.model.finite import not_finite
 from camcomp.model.job import Job

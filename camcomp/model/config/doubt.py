@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from camcomp.ground.errors import Location
+from camcomp.ground.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from functools import cache
 from types import NoneType
 from typing import Any, get_args, get_origin
@@ -18,6 +17,7 @@ from pydantic.fields import FieldInfo
 
 from camcomp.ground import shelf
 from camcomp.ground.files import shipped
+from camcomp.ground.records import dataclass, field
 from camcomp.model.config.base import Spec
 from camcomp.model.config.cutting_tool import ToolTableFile
 from camcomp.model.config.load import params_of

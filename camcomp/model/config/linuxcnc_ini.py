@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
 
 from camcomp.gcode.stated import INCH_MM
 from camcomp.ground.bounds import number_of
 from camcomp.ground.errors import CamcompError, ConfigError, Location
+from camcomp.ground.records import dataclass, field, replace
 from camcomp.model.config.doubt import Doubt
 from camcomp.model.config.yaml_tree import Node, child
 

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +11,7 @@ from pydantic import Field, create_model
 from camcomp.ground import shelf
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, Location, raise_all
 from camcomp.ground.files import display_name, read_bytes
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.config import linuxcnc_ini
 from camcomp.model.config.base import Spec
 from camcomp.model.config.doubt import Doubt

@@ -6,12 +6,12 @@ The tree is read with the plain value; its spread is stored separately. A number
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Any
 
 from camcomp.ground.bounds import LARGEST_NUMBER
 from camcomp.ground.errors import CamcompError, ConfigError, Location
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.config.yaml_tree import Node
 
 SECTIONS = ("robot", "workpiece", "tool", "process", "effects")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 
+from camcomp.ground.records import dataclass, field
 from camcomp.model.config.cutting_tool import Cutter, Stock
 from camcomp.model.config.spec import Config
 

@@ -7,7 +7,6 @@ of a tool itself counts, and what contradicts it is a warning with both values.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from camcomp.gcode.stated import INCH_MM
 from camcomp.ground import shelf
 from camcomp.ground.errors import CamcompError, ConfigError, Location
 from camcomp.ground.files import display_name, read_bytes
+from camcomp.ground.records import dataclass, field, replace
 from camcomp.model.config.doubt import Doubt
 from camcomp.model.config.yaml_tree import Node, child
 

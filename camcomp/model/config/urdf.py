@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import json
 import re
-from dataclasses import dataclass, field
 from math import degrees
 from xml.sax import SAXParseException, handler, make_parser
 from xml.sax.xmlreader import InputSource
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from camcomp.ground.bounds import number_of
 from camcomp.ground.datatypes import STANDARD_GRAVITY
 from camcomp.ground.errors import ConfigError, Location
+from camcomp.ground.records import dataclass, field
 
 LARGEST_M = 1e12  # of any number: m, kg, rad
 MOST_BYTES = 1 << 23

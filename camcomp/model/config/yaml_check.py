@@ -1,7 +1,6 @@
 """Check of a YAML tree against a spec: pydantic's findings as messages with rule ids, locations and hints."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any, TypeVar
 
@@ -9,6 +8,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from camcomp.ground.errors import CamcompError, ConfigError
+from camcomp.ground.records import dataclass, replace
 from camcomp.ground.rules import RULES
 from camcomp.model.config.base import Spec
 from camcomp.model.config.yaml_tree import Node, child, plain

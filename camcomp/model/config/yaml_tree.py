@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from ruamel.yaml.reader import ReaderError
 
 from camcomp.ground.bounds import LARGEST_NUMBER
 from camcomp.ground.errors import ConfigError, Location
+from camcomp.ground.records import dataclass, replace
 
 # A mapping that names another member than the earlier file has other keys too: it replaces the earlier one as a whole.
 _SELECTORS = ("type", "model")

@@ -7,13 +7,13 @@ diameter; there the tool meets less than a slot.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.records import dataclass, field
 from camcomp.ground.source_lines import named_lines
 from camcomp.ground.vectors import sizes
 from camcomp.model.config.cutting_tool import Cutter

@@ -1,12 +1,12 @@
 """Cutting conditions of the averaged models, taken from a Cut, with errors that name the key to add."""
 
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.ground.errors import ConfigError
+from camcomp.ground.records import replace
 from camcomp.model.cutting.cut import Cut
 from camcomp.model.cutting.engaged import EngagementArcs
 from camcomp.model.cutting.engagement import Milling, immersion

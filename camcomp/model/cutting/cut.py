@@ -1,10 +1,9 @@
 """Input of a force model: the cut at n points of a path, as a struct of arrays."""
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats, Ints, frozen
+from camcomp.ground.records import dataclass, field
 from camcomp.model.cutting.engaged import EngagementArcs
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats, Ints, Path
+from camcomp.ground.records import dataclass, replace
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -1,12 +1,11 @@
 """Cutting coefficients from measured mean forces of slots at several feeds per tooth (Altintas, section 2.7.1)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError
+from camcomp.ground.records import dataclass
 
 
 @dataclass(frozen=True, eq=False)

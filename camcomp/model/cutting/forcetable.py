@@ -7,7 +7,6 @@ holds for the motion that ends there, the last for the one that starts, and a `l
 With `line` alone the rows of a line are averaged. Rows without any force are skipped.
 """
 
-from dataclasses import dataclass
 from difflib import get_close_matches
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from camcomp.ground.csv_table import CsvTable, TableRules, read_csv
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.errors import CamcompError, ConfigError, raise_all
+from camcomp.ground.records import dataclass
 
 PATH_COLUMNS = ("Fr_N", "Ft_N", "Fz_N")
 MACHINE_COLUMNS = ("fx_N", "fy_N", "fz_N")

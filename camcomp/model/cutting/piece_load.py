@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.records import dataclass
 from camcomp.model.cutting.engaged import Engaged
 
 STRAIGHT = 1e-9  # of the force: deviation from the line between its neighbours below which a place is redundant

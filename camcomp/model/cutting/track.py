@@ -11,7 +11,6 @@ or sense of the spindle, another tool, a step of a table) the force jumps.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -19,6 +18,7 @@ import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.records import dataclass, field, replace
 from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.corners import find_corners, share_loads
 from camcomp.model.cutting.cut import Cut

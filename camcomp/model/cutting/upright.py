@@ -7,11 +7,10 @@ make the arc a spiral, whose tangent is vertical at a slightly different angle; 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.ground.datatypes import ARC, Floats, Ints, Path
+from camcomp.ground.records import dataclass
 
 REVERSAL_OFFSET_RAD = 2e-4  # rad from a sharp reversal at which the directions on its sides are taken
 AT_END = 1e-5  # rad from the ends of an arc at which its directions there are taken; undefined at the vertical itself

@@ -9,7 +9,6 @@ mrad, urad. The error is the true position of the axis minus the reading of its 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from camcomp.ground.csv_table import CsvTable, TableRules, like_a_table, read_cs
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, Location, raise_all
 from camcomp.ground.files import display_name, read_bytes
+from camcomp.ground.records import dataclass
 
 UNITS = {"mm": 1.0, "um": 1e-3, "rad": 1.0, "mrad": 1e-3, "urad": 1e-6}
 LENGTHS = ("mm", "um")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.signal import savgol_filter
 
 from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.records import dataclass, field
 from camcomp.model.effect import Load, Motion
 
 _TIME = {

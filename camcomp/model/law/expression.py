@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from difflib import get_close_matches
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass
 from camcomp.model.hysteresis import direction, play
 
 LONGEST = 4000  # characters

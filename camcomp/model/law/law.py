@@ -7,13 +7,13 @@ envelope's width.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.notes import note
+from camcomp.ground.records import dataclass
 from camcomp.model.law.covariates import DriveRows, TipRows
 
 On = Literal["control", "drive", "structure", "tool", "workpiece"]

@@ -6,11 +6,11 @@ It never exceeds its largest coefficient, for the splines add up to one.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass
 
 DEGREE = 3
 

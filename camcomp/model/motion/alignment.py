@@ -7,7 +7,6 @@ along the path for all rows jointly, by dynamic programming, which copes with re
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -16,6 +15,7 @@ from scipy.optimize import isotonic_regression
 from camcomp.ground import path_geometry
 from camcomp.ground.compiled import inner, kept
 from camcomp.ground.datatypes import ARC, Floats, Ints, Path
+from camcomp.ground.records import dataclass
 
 _CHORD_RAD = 0.05  # chord of an arc
 _LINE_MM2 = 0.01  # mm²: cost of a wrong line number, plus _LINE_TIMES times the squared distance

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
+from camcomp.ground.records import replace
 from camcomp.model.effect import Motion
 from camcomp.model.hysteresis import direction
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.ground.errors import PhysicsError
 from camcomp.ground.orientation import rotations_about
+from camcomp.ground.records import dataclass
 from camcomp.model.statics.arm import ARM_LENGTH
 from camcomp.model.statics.description import Robot
 from camcomp.model.statics.machine import Machine, build_machine

@@ -8,7 +8,6 @@ a cut begins) carry a bound of its error.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +17,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.orientation import rotation_vectors, rotations_about
+from camcomp.ground.records import dataclass
 from camcomp.model.cutting.track import Track
 from camcomp.model.motion.alignment import Aligned
 from camcomp.model.motion.driven_pieces import DrivenPieces, near_largest_change, node_loads

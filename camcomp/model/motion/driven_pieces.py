@@ -6,13 +6,13 @@ of their own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.motion.node_pieces import NODES, SPLIT, Places, basis_at
 
 _PIECE_MM = 60.0

@@ -5,7 +5,6 @@ Values that many readings of a run share (between the nodes, under the usual loa
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass, field
 from camcomp.model.effect import Load
 from camcomp.model.motion.node_pieces import Places
 from camcomp.model.motion.run_path import RunPath

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from camcomp.ground.records import dataclass
 
 TIME, LINE, TEMPERATURE = "t_s", "line", "temp_C"
 TIP = ("x_mm", "y_mm", "z_mm")

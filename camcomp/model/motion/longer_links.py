@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass, field
 from camcomp.model.motion.node_pieces import Places
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.statics.description import Robot

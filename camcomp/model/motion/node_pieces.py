@@ -5,11 +5,10 @@ Trefethen, SIAM Review 46, 2004). Six nodes on 60 degrees of an arc, or on 60 mm
 Orthoglide within 0.01 um.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.ground.datatypes import ARC, Floats, Ints, Path
+from camcomp.ground.records import dataclass
 
 NODES = 6
 _ARC_RAD = np.pi / 3

@@ -7,13 +7,13 @@ exact solution of the structure. Effects of sensors change no part and do not ac
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
 from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.records import dataclass, fields, replace
 from camcomp.model import signal_path
 from camcomp.model.effect import Load, Motion
 from camcomp.model.finite import not_finite

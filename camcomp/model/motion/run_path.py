@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ import numpy as np
 from camcomp.ground import path_geometry
 from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import direction
 from camcomp.model.motion.node_pieces import Pieces, Places, cut

@@ -1,13 +1,12 @@
 """Simulated log of a program: readings of the twin, row by row."""
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from camcomp.ground import progress
 from camcomp.ground.csv_table import refuse_long
 from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.ground.errors import ProgramError
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import lay_track

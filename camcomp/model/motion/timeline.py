@@ -3,12 +3,11 @@
 Motions are those of a Path; rapids take no time here, because logs do not contain them.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Floats, Ints, Path
+from camcomp.ground.records import dataclass
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

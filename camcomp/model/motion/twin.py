@@ -8,7 +8,6 @@ the second ones where carriages are far off.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from itertools import combinations_with_replacement
 from typing import Any
@@ -18,6 +17,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import PhysicsError
+from camcomp.ground.records import dataclass, field, replace
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.job import Job

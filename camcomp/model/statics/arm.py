@@ -5,11 +5,10 @@ These are the kinematics of an arm's controller; the solver adds joint offsets a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.ground.records import dataclass
 from camcomp.model.statics.description import Actuator, Chain, Parallelogram, Passive, Robot, Transform
 from camcomp.model.statics.rotation import exp_rotation
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.ground.records import replace
 from camcomp.model.config import robot as spec
 from camcomp.model.config.links import Spring
 from camcomp.model.statics.arm import arm_of, end_pose

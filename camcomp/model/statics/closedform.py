@@ -7,12 +7,12 @@ Source: Pieper, "The kinematics of manipulators under computer control" (1968); 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.ground.records import dataclass
 from camcomp.model.statics.arm import Arm, joint_lines
 from camcomp.model.statics.rotation import exp_rotation
 

@@ -9,11 +9,12 @@ a changed copy.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from camcomp.ground.records import dataclass, field, replace
 
 Array = NDArray[np.float64]
 

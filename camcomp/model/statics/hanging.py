@@ -7,11 +7,10 @@ the weights at the deflected pose, a contraction for every arm that stands.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.ground.records import dataclass
 from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.description import Actuator, Link, Robot, Transform, Weight
 from camcomp.model.statics.lengths import LENGTH_STEP_MM, lengthened

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
+from camcomp.ground.records import replace
 from camcomp.model.statics.description import Actuator, Chain, Element, Parallelogram, Robot, Transform
 
 LENGTH_STEP_MM = 0.1  # of differences: linear within 1e-4 for links of 100 mm and more

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.ground.records import dataclass
 from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.closedform import ClosedForm, closed_form
 from camcomp.model.statics.description import Robot

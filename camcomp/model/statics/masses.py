@@ -11,12 +11,12 @@ Source: Newton-Euler equations of a serial chain of point masses (Siciliano et a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from camcomp.ground.datatypes import STANDARD_GRAVITY, Floats
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.statics.description import (
     Actuator,
     Chain,

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.ground.records import dataclass, field
 from camcomp.model.statics import layout as lay
 from camcomp.model.statics.description import (
     Actuator,

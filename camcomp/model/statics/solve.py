@@ -9,12 +9,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from camcomp.ground.progress import points
+from camcomp.ground.records import dataclass
 from camcomp.model.statics import point, rigid, sweep
 from camcomp.model.statics.layout import SPRINGS, new_memory, new_work
 from camcomp.model.statics.machine import Machine

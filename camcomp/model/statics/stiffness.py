@@ -7,11 +7,10 @@ Chablat, Mech. Mach. Theory 46 (2011) 662-679). Unloaded: the same where nothing
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.ground.records import dataclass
 from camcomp.model.statics.gradients import gradients_many
 from camcomp.model.statics.layout import new_work
 from camcomp.model.statics.machine import Machine, build_machine

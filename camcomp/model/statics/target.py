@@ -7,11 +7,10 @@ platform's tilt stays and is reported.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.statics.arm import NEAR_SINGULAR, arm_of, dexterity
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.rigid import MAX_ITERATIONS, SINGULAR

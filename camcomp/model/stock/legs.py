@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.records import dataclass
 from camcomp.model.cutting.track import JOIN_ANGLE, PLUNGE_SINE
 from camcomp.model.stock.places import CUT_LEG, PLUNGE_LEG, RAPID_LEG, UNSEEN_LEG
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats, Ints, Path
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.cutting.engaged import Engaged, EngagementArcs
 from camcomp.model.stock.along_legs import ROOM_FOR_ARCS, ROOM_FOR_PLACES, cut_legs, peek, settle
 from camcomp.model.stock.at_tip import meet, take_way

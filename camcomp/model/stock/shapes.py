@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass
 from camcomp.model.stock.field import BOX
 from camcomp.model.stock.front import EDGE, FLOOR
 from camcomp.model.stock.sweeps import BALL, BULL, DRILL, FLAT

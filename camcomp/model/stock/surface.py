@@ -5,12 +5,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.ground.compiled import entry
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.records import dataclass
 from camcomp.model.stock.field import height
 from camcomp.model.stock.memory import StockMemory
 from camcomp.model.stock.sweeps import NOWHERE

@@ -7,13 +7,12 @@ that close count as one for the cutting force, too.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from camcomp.ground.datatypes import RAPID, Floats, Path
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.orientation import smallest_rotations
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.config.spec import Config
 from camcomp.model.cutting.track import JOIN_ANGLE
 from camcomp.model.stock.field import BOX, MESH, ROUND

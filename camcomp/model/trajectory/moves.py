@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
 
 import numpy as np
 
 from camcomp.gcode.path_mode import PathMode, numbered
 from camcomp.ground.datatypes import Bools, Floats, Ints, Path
+from camcomp.ground.records import dataclass, fields
 
 
 @dataclass(frozen=True)

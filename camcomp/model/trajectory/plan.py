@@ -6,12 +6,11 @@ corners (corners.py) and sets the speed along them (speeds.py).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
+from camcomp.ground.records import dataclass
 from camcomp.ground.vectors import sizes
 from camcomp.model.trajectory.corners import CYCLES, corners, nearest
 from camcomp.model.trajectory.merging import straight

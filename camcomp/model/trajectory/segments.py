@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from camcomp.gcode.path_mode import PathMode
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, LINE, Bools, Floats, Ints, Path
+from camcomp.ground.records import dataclass, replace
 from camcomp.model.trajectory.merging import merge, straight
 from camcomp.model.trajectory.moves import ToolMoves, moves_of
 
