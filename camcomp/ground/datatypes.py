@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camcomp.ground.orientation import Orientation
 from camcomp.ground.records import dataclass, fields
+
+if TYPE_CHECKING:
+    from camcomp.ground.orientation import Orientation
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

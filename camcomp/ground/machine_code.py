@@ -42,26 +42,25 @@ def sources(file: Path) -> frozenset[Path]:
         each = open_files.pop()
         if each not in found:
             found.add(each)
-            open_files += _imported(each)
+            open_files += _read(each)[1]
     return frozenset(found)
 
 
 @functools.cache
-def _imported(file: Path) -> tuple[Path, ...]:
-    """Files of camcomp that a file imports at module level."""
-    found = []
-    for module, names, alone in _IMPORT.findall(file.read_text(encoding="utf-8")):
+def _read(file: Path) -> tuple[bytes, tuple[Path, ...]]:
+    """Digest of a file, and the files of camcomp that it imports at module level."""
+    data, found = file.read_bytes(), []
+    for module, names, alone in _IMPORT.findall(data.decode()):
         place = ROOT.joinpath(*(module or alone).split("."))
-        below = [place / name for name in re.findall(r"\w+", names)]
-        for each in (place, *below):
-            found += [path for path in (each.with_suffix(".py"), each / "__init__.py") if path.is_file()]
-    return tuple(found)
+        below = [place / name for name in re.findall(r"\w+", names)] if place.is_dir() else []
+        found += [path for each in (place, *below) for path in (each.with_suffix(".py"), each / "__init__.py")]
+    return hashlib.sha256(data).digest(), tuple(path for path in found if path.is_file())
 
 
 @functools.cache
 def digest(file: Path) -> str:
     """Digest of the sources of a kernel's file."""
-    return hashlib.sha256(b"".join(each.read_bytes() for each in sorted(sources(file)))).hexdigest()
+    return hashlib.sha256(b"".join(_read(each)[0] for each in sorted(sources(file)))).hexdigest()
 
 
 def _not_kept(reason: str) -> None:

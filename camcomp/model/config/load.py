@@ -31,7 +31,7 @@ ROBOT_KEYS = (
 )  # belong to the robot, whatever plug-in builds its chains
 
 _SECTIONS = tuple(key for spec in (Config, Experiment) for key in spec.yaml_keys() if key != "source")
-_SECTION = re.compile(rb"(^|[{,])[ \t\"']*(%s)[\"']?[ \t]*:([ \t\r\n]|$)" % "|".join(_SECTIONS).encode(), re.MULTILINE)
+_SECTION = rb"(?m)(^|[{,])[ \t\"']*(%s)[\"']?[ \t]*:([ \t\r\n]|$)" % "|".join(_SECTIONS).encode()
 _NO_FORCE = Node({"model": Node("none", Location("", 1, 1))}, Location("", 1, 1))
 
 
@@ -253,7 +253,7 @@ def _with_other_files(tree: Node) -> tuple[Node, list[Doubt], list[CamcompError]
 def _is_ours(tree: Node | None, data: bytes) -> bool:
     """Whether a file can be meant for camcomp: it has a section, or a key with a name like one."""
     if tree is None:  # not YAML: by the look of its lines
-        return bool(_SECTION.search(data))
+        return bool(re.search(_SECTION, data))
     keys = tree.value if isinstance(tree.value, dict) else {}
     return any(key in _SECTIONS or get_close_matches(str(key)[:40], _SECTIONS, n=1) for key in keys)
 

@@ -80,7 +80,7 @@ def test_what_is_behind_an_import_counts(way, tmp_path, monkeypatch):
     monkeypatch.setattr(machine_code, "ROOT", tmp_path)
 
     def digest():
-        for each in (machine_code._imported, machine_code.sources, machine_code.digest):
+        for each in (machine_code._read, machine_code.sources, machine_code.digest):
             each.cache_clear()
         return machine_code.digest(folder / "near.py")
 
