@@ -59,7 +59,6 @@ from camcomp.model.job import Job
 from camcomp.model.motion.twin import Twin
 
 ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
-EXCLUDED = 0.02  # probability of a set of causes, below which no experiment need test it
 UNLOGGED_RISE = (0.3, 3.0)  # times the 10 K that are taken where no temperature is logged: by how much drives warm up
 RIVALS = 8  # sets that one experiment is asked to tell from the answer
 
@@ -135,7 +134,7 @@ def _proposed(proposal: Proposal) -> NextExperiment:
 
 
 def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal | None:
-    """The experiment that separates the answer from its rivals: sets that explain as well, or else those not yet excluded.
+    """The experiment that separates the answer from its rivals: sets that explain as well, or else the next likely ones.
 
     Without a rival, the one that reduces the error by its uncertainty on the runs' programs.
     """
@@ -147,8 +146,7 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
     best = sets.first
     close = [best, *sets.rivals[:RIVALS]]
     if len(close) == 1:
-        likely = (int(j) for j in np.argsort(-sets.probability) if sets.probability[j] > EXCLUDED)
-        close += [j for j in likely if j != best][:3]
+        close += [j for j in np.argsort(-sets.probability).tolist() if j != best][: MOST_SETS - 1]
     # rivals explain equally well: a low prior does not exclude them
     p = np.ones(len(close)) if sets.rivals else sets.probability[close]
     fits = [sets.fits[j] for j in close]

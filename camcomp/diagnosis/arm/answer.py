@@ -18,7 +18,7 @@ from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.folds import without_nuisances
 from camcomp.diagnosis.model.group import split_regions
-from camcomp.diagnosis.model.noise import MINOR
+from camcomp.diagnosis.model.noise import HEALTHY, LEAST_VALUES, MINOR
 from camcomp.diagnosis.model.verdict import VerdictInputs, decide
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
@@ -37,10 +37,8 @@ from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
 from camcomp.ground.datatypes import Floats
 
-MIN_LISTED_FLOORS = 0.01  # of the floor: an effect that moves the tip less is not listed
 PLACES = 8  # parts of the workspace
 STRETCHES = 16  # of a campaign's time
-SHORTEST = 12  # poses in a stretch
 MOST_DRIVERS = 6  # that are listed
 
 
@@ -68,7 +66,7 @@ def causes(case: PoseCase) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, .
         energy = energy_of(case, part.columns)
         size = 1e3 * float(np.sqrt(energy / rows))
         if case.floor is not None and size < MINOR * case.floor.um:
-            if size >= MIN_LISTED_FLOORS * case.floor.um:
+            if size >= HEALTHY * case.floor.um:
                 minor.append(MinorEffect(effect=part.effect, target=part.target, size_um=_round(size)))
             continue
         cause = FoundCause(
@@ -224,8 +222,8 @@ def _energy_beside(case: PoseCase, background: Background) -> float:
 
 
 def windows(time: Floats) -> list[np.ndarray]:
-    """Indices of at most STRETCHES stretches of time of SHORTEST poses or more."""
-    count = min(STRETCHES, len(time) // SHORTEST)
+    """Indices of at most STRETCHES stretches of time of LEAST_VALUES poses or more."""
+    count = min(STRETCHES, len(time) // LEAST_VALUES)
     return list(np.array_split(np.argsort(time, kind="stable"), count)) if count > 1 else []
 
 

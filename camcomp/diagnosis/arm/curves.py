@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from camcomp.diagnosis.arm.poses import ArmBench, Column, combined, wave
+from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Column, combined, wave
 from camcomp.diagnosis.result.types import CurveCause, ErrorCurve, Estimate, FoundCause, six_digits
+from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Motion
 
-GAP_DEG = 6.0  # angles closer than this are one interval: less than the shortest wave, 9 deg, and twice the fade of the effect
 DRAWN_DEG = 3.0  # step at which a curve is told
 
 
@@ -53,10 +53,10 @@ def curve_cause(
 
 
 def seen_angles(angle: Floats) -> tuple[tuple[float, float], ...]:
-    """Intervals of a turn, deg, low from -180 on, that angles (n,) rad of poses lie in; gaps below GAP_DEG are none."""
+    """Intervals of a turn, deg, low from -180 on, that angles (n,) rad of poses lie in; between two less than 2 FADE_DEG of the effect apart the curve does not fade to zero."""
     turn = np.unique(np.round((np.degrees(angle) + 180.0) % 360.0 - 180.0, 2))
     gaps = np.diff(turn, append=turn[0] + 360.0)
-    ends = np.flatnonzero(gaps > GAP_DEG)
+    ends = np.flatnonzero(gaps > 2.0 * shelf.load("effects", CURVE).FADE_DEG)
     if not len(ends):
         return ((-180.0, 180.0),)
     starts = np.roll((ends + 1) % len(turn), 1)

@@ -14,17 +14,20 @@ from scipy.spatial import KDTree
 from scipy.stats import chi2
 
 from camcomp.diagnosis.arm.poses import Poses
-from camcomp.diagnosis.model.noise import StatedDeviation, resolution_of, rounding_noise
+from camcomp.diagnosis.model.discrepancy import ORDERS, smooth_functions
+from camcomp.diagnosis.model.noise import (
+    FAR_OFF,
+    IN_A_ROW,
+    LEAST_VALUES,
+    MANY,
+    StatedDeviation,
+    resolution_of,
+    rounding_noise,
+)
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.description import Robot
 
 SAME_POSE = 1e-3  # rad or m between two visits of one pose; the model turns the rest of the way into mm
-LEAST_VISITS = 10  # beyond the first ones; fewer know a deviation to no better than a fifth
-DRIFT_WAVES = 8  # slow waves in time: how an instrument wanders over a campaign
-ENOUGH = 4.0  # visits per wave from which on they are told from noise
-FAR = 8.0  # medians: no noise reaches so far, beams that were cut do
-IN_A_ROW = 3  # poses far off: something lasts
-MOST_FAR = 0.03  # of the poses; where more are far off, something acts there
 
 
 @dataclass(frozen=True)
@@ -79,14 +82,19 @@ def far_off(size: Floats, time: Floats) -> np.ndarray:
 
     IN_A_ROW of them one after the other are no mistakes either.
     """
-    far = size > FAR * max(float(np.median(size)), 1e-6)
-    if far.sum() > max(MOST_FAR * len(far), 1.0):  # one of a few poses may be a mistake as well
+    far = size > _most(size)
+    if far.sum() > max(MANY * len(far), 1.0):  # one of a few poses may be a mistake as well
         return np.zeros(len(size), bool)
     order = np.argsort(time, kind="stable")
     for run in np.split(order, np.flatnonzero(np.diff(far[order].astype(int))) + 1):
         if len(run) >= IN_A_ROW:
             far[run] = False
     return far
+
+
+def _most(size: Floats) -> float:
+    """FAR_OFF robust deviations of a coordinate, from distances (n,) in space."""
+    return FAR_OFF * max(float(np.median(size) / np.sqrt(chi2.median(3))), 1e-6)
 
 
 def _stated(robot: Robot, campaigns: Sequence[Poses], stated: StatedDeviation) -> TipFloor | None:
@@ -117,9 +125,9 @@ def _repeated(robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], 
 
 
 def _near(visits: Sequence[np.ndarray], gap: Floats) -> list[np.ndarray]:
-    """Visits whose gaps (n, 3) scatter by at most FAR times the median scatter of all visits."""
+    """Visits whose gaps (n, 3) scatter by no more than noise does."""
     size = np.array([np.sqrt(_square(gap[rows]) / (len(rows) - 1)) for rows in visits])
-    return [rows for rows, own in zip(visits, size, strict=True) if own <= FAR * max(float(np.median(size)), 1e-6)]
+    return [rows for rows, own in zip(visits, size, strict=True) if own <= _most(size)]
 
 
 def _square(values: Floats) -> float:
@@ -131,19 +139,19 @@ def _minus_drift(visits: Sequence[np.ndarray], gap: Floats, order: np.ndarray) -
     time removed.
     """
     more = sum(len(rows) - 1 for rows in visits)
-    if more < ENOUGH * DRIFT_WAVES:
+    if more < ORDERS + LEAST_VALUES:
         return [(_square(gap[rows]), len(rows) - 1.0) for rows in visits]
-    waves = np.cos(np.pi * np.arange(1, DRIFT_WAVES + 1) * ((order + 0.5) / len(order))[:, None])
+    waves = smooth_functions(order + 0.5, 0.0, len(order))
     left = np.concatenate([gap[rows] - gap[rows].mean(axis=0) for rows in visits])
     basis = np.concatenate([waves[rows] - waves[rows].mean(axis=0) for rows in visits])
     left = left - basis @ np.linalg.lstsq(basis, left, rcond=1e-9)[0]
     parts = np.split(left, np.cumsum([len(rows) for rows in visits])[:-1])
-    share = 1.0 - DRIFT_WAVES / more  # of the freedom is left
+    share = 1.0 - ORDERS / more  # of the freedom is left
     return [(float((each**2).sum()), share * (len(each) - 1)) for each in parts]
 
 
 def _scatter(groups: Sequence[tuple[float, float]], source: Literal["repeats", "rest"], quiet: bool) -> TipFloor | None:
-    if sum(more for _, more in groups) < LEAST_VISITS:
+    if sum(more for _, more in groups) < LEAST_VALUES:
         return None
     square, more = np.array(groups).T
     freedom = 3.0 * float(more.sum())

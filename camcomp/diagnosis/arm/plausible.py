@@ -9,18 +9,16 @@ import numpy as np
 
 from camcomp.diagnosis.arm.registration import nuisance_columns, register
 from camcomp.diagnosis.fit.outliers import FAR_MM
-from camcomp.diagnosis.model.readings import Reading, refuse_as_read
+from camcomp.diagnosis.model.noise import LEAST_VALUES
+from camcomp.diagnosis.model.readings import ROWS_APART, Reading, refuse_as_read
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.statics.arm import arm_of, jacobian
 from camcomp.model.statics.description import Robot
 from camcomp.model.statics.hanging import hang
 
-NEAR = 0.005  # of the poses' spread: arms as they are bought; below it no other reading is asked for
-FAR = 0.02  # of the spread: no arm of the kind is wrong by so much
-SHIFTS = (1, -1, 2, -2)  # rows
+FAR = 0.02  # of the poses' spread: no arm of the kind is wrong by so much
 POSES = 200
-LEAST = 12  # poses; fewer fit anything
 _TIPS = {"m": 1e3, "inches": 25.4, "um": 1e-3}
 
 
@@ -31,13 +29,13 @@ def check_poses(log: str, run: str, robot: Robot, q: Floats, tip: Floats) -> lis
         ConfigError: poses that cannot be the arm's as they are read. CC407: another unit, CC408: columns exchanged or
             reversed, CC412: joints and tips of different rows, CC413: none of these, and no elastic deflection either.
     """
-    if len(q) < LEAST:
+    if len(q) < LEAST_VALUES:
         return []
     rows = np.unique(np.linspace(0, len(q) - 1, POSES).astype(int))
     point, pose = _stand(robot, q[rows])
     spread = float(np.sqrt(((point - point.mean(axis=0)) ** 2).sum(axis=1).mean()))
     off = _misfit(point, pose, tip[rows])
-    if off < max(NEAR * spread, FAR_MM) or spread <= 0.0:
+    if off < FAR_MM or spread <= 0.0:
         return []
     refuse_as_read(
         log, off, [(rule, f"run '{run}': {text}", read) for rule, text, read in _readings(robot, q, tip, rows)]
@@ -86,7 +84,7 @@ def _readings(robot: Robot, q: Floats, tip: Floats, rows: np.ndarray) -> list[Re
     out.append(("CC407", "the joints look as if logged in degrees", joints(np.where(hinges, np.radians(q), q))))
     if not hinges.all():
         out.append(("CC407", "the joints that slide look as if logged in m", joints(np.where(hinges, q, 1e3 * q))))
-    for by in SHIFTS:
+    for by in ROWS_APART:
         way = "behind" if by < 0 else "ahead of"
         text = f"the tips look {abs(by)} row{'s' if abs(by) > 1 else ''} {way} their joints"
         out.append(("CC412", text, shifted(by)))

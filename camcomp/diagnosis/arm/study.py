@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from camcomp.diagnosis.arm import answer
 from camcomp.diagnosis.arm.case import PoseCase, named_rows
@@ -29,6 +30,7 @@ from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
 from camcomp.diagnosis.statistics.probability import EVEN
+from camcomp.diagnosis.statistics.shrinkage import SURELY
 from camcomp.ground import progress
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
@@ -40,7 +42,6 @@ CAMPAIGN_SEED = 20200714  # drawing has to give the same answer twice
 PASSES = 2  # of linearising about what was found
 MANY = 4  # causes from which on a joint that was shifted for a while is looked for
 CLOSE = 1.1  # ratio of floors that need no second look
-CHI2_3_MEDIAN, CHI2_3_EDGE = 2.366, 9.348  # of chi-square with 3 degrees of freedom: 50 and 97.5 %
 LOOSE_FRAME = 1e-3  # ratio of singular values of a frame's columns below which rows do not fix it
 
 
@@ -107,8 +108,8 @@ def cleaned(
         outliers += named_rows(poses, far)
         campaigns[k] = poses.take(~far)
         square = size[~far] ** 2
-        scale = max(float(np.median(square)) / CHI2_3_MEDIAN, 1e-18)
-        weights.append(np.maximum(np.sqrt(square / scale / CHI2_3_EDGE), 1.0))
+        scale = max(float(np.median(square)) / chi2.median(3), 1e-18)
+        weights.append(np.maximum(np.sqrt(square / scale / chi2.ppf(SURELY, 3)), 1.0))
     return ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted), shelf, outliers, weights
 
 

@@ -9,12 +9,12 @@ import numpy as np
 from camcomp.diagnosis.arm.poses import ArmBench, Column
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.folds import without_nuisances
+from camcomp.diagnosis.model.noise import IN_A_ROW
 from camcomp.diagnosis.model.window import best_window
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 
 EFFECT = "disturbance"
-SHORTEST = 4  # poses: fewer are outliers
 
 
 def temporary_offsets(
@@ -32,12 +32,12 @@ def temporary_offsets(
         order = np.argsort(poses.time, kind="stable")
         time = poses.time[order]
         n = len(order)
-        if n < 3 * SHORTEST or not poses.has_clock:
+        if n < 3 * IN_A_ROW or not poses.has_clock:
             continue
         left = without_nuisances(rest[k], frames[k])[order]
         basis = np.linalg.qr(frames[k][order].reshape(3 * n, -1))[0].reshape(n, 3, -1)
         for a, drive in enumerate(bench.robot.actuators):
-            _, begin, end = best_window(joints[k][order, :, a], left, basis, np.arange(n + 1), SHORTEST)
+            _, begin, end = best_window(joints[k][order, :, a], left, basis, np.arange(n + 1), IN_A_ROW)
             if begin == end:
                 continue
             edges = [_between(time, begin), _between(time, end)]

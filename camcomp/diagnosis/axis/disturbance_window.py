@@ -16,15 +16,11 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 
 CELL_S = 0.02  # in which a window begins and ends, before it is placed to a row
 SHORTEST_S = 0.2  # of a window
-LEVEL = 0.5  # of the shift: every quarter of a window has to show it to within that
-QUARTERS = 4
+QUARTERS = 4  # of a window, each of which has to be nearer to its shift than to none
 LEAST_SIZE = 2.0  # of the floor, that a push has to be: a force's zero wanders by less
 PLACES = 40  # of the travel, each way of its own
 FARTHEST = 3  # cells by which an end is moved to its row
-SHARP_S, SHARP = (
-    0.02,
-    0.6,
-)  # beyond an end, at least two rows; of the shift that has to be gone there: no place ends like that
+SHARP_S = 0.02  # beyond an end, at least two rows, in which most of the shift has to be gone: no place ends like that
 
 
 @dataclass(frozen=True)
@@ -67,7 +63,7 @@ def find_window(
     inside, outside = away_from_ends(first, last, times[k])
     shift = _step(rests[k], inside, outside) / _step(_seen(bases[k], first, last), inside, outside)
     parts = [float(np.mean(p) - np.mean(rest[outside])) for p in np.array_split(rest[inside], QUARTERS)]
-    if not all(abs(p - shift) < LEVEL * abs(shift) for p in parts):
+    if not all(abs(p - shift) < 0.5 * abs(shift) for p in parts):
         return None
     return Window(k, first, last, shift), rest
 
@@ -141,7 +137,7 @@ def sharp(window: Window, rest: Floats, time: Floats) -> bool:
         return False
     ends = [(window.first, -1), (window.last, 1)]
     jumps = [np.mean(_beside(rest, at, -side, reach)) - np.mean(_beside(rest, at, side, reach)) for at, side in ends]
-    return all(float(jump) / window.shift > SHARP for jump in jumps)
+    return all(float(jump) / window.shift > 0.5 for jump in jumps)
 
 
 def rising(push: Floats, time: Floats, rise_s: float) -> Floats:

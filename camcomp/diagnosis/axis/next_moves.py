@@ -14,6 +14,7 @@ import numpy as np
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.findings import AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import STRETCH_S
+from camcomp.diagnosis.axis.plausible import MIDDLE
 from camcomp.diagnosis.axis.surroundings import POSES
 from camcomp.diagnosis.axis.terms import travel
 from camcomp.diagnosis.model.design import designed
@@ -23,12 +24,10 @@ from camcomp.diagnosis.result.types import UNKNOWN, AxisMoves, NextExperiment, S
 from camcomp.ground.datatypes import Floats
 
 BLOCKS = 4  # of a proposal
-BLOCK_S = 20.0  # of strokes; one there and back at least
-LONGEST_S = 60.0  # of one there and back
+BLOCK_S = 60.0  # of strokes, one there and back at least: four minutes of a proposal
 LENGTHS = (1.0, 0.3, 0.05)  # of the travel that the runs had
 SPEEDS = (0.05, 0.2, 0.5, 1.0)  # of the speed that they had
 REST_S = 0.2  # at either end of a stroke
-USED = 0.99  # quantile of what the runs had that strokes may have
 _MEANS = {
     "position": "If what is left of {0} is the same at the same place in every stroke, it goes with the position: screw, scale or guide.",
     "velocity": "If it changes with the speed, or from one way to the other, it goes with the velocity: friction or the loop.",
@@ -91,8 +90,8 @@ def _designed(axis: AxisFindings, logs: Sequence[AxisRun]) -> tuple[AxisMoves, f
     position, speed, push = (
         np.concatenate([getattr(at, part) for at in seen]) for part in ("position", "speed", "acceleration")
     )
-    low, high = (float(np.quantile(position, q)) for q in (1.0 - USED, USED))
-    fastest, hardest = (float(np.quantile(np.abs(each), USED)) for each in (speed, push))
+    low, high = np.quantile(position, MIDDLE).tolist()
+    fastest, hardest = (float(np.quantile(np.abs(each), MIDDLE[1])) for each in (speed, push))
     step = float(np.median(np.concatenate([np.diff(run.time) for run in logs])))
     if not (high - low > 0.0 and fastest > 0.0 and hardest > 0.0 and step > 0.0):
         return None
@@ -125,8 +124,8 @@ def _blocks(low: float, high: float, fastest: float, hardest: float) -> Iterator
             ends = low + start * (high - low), low + (start + length) * (high - low)
             speed = rate * fastest
             once = 2.0 * ((ends[1] - ends[0]) / speed + speed / hardest + REST_S)
-            if once <= LONGEST_S:
-                times = max(round(BLOCK_S / once), 1)
+            if once <= BLOCK_S:
+                times = int(BLOCK_S / once)
                 yield StrokeBlock(low=_tidy(ends[0]), high=_tidy(ends[1]), speed=_tidy(speed), times=times)
 
 

@@ -8,15 +8,13 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import median_abs_deviation, norm
 
-from camcomp.diagnosis.model.noise import REPEATABILITY_MM
+from camcomp.diagnosis.model.noise import FAR_OFF, IN_A_ROW, REPEATABILITY_MM
 from camcomp.ground.datatypes import Floats
 
 STAYING = 0.1  # of the rows that do not move, from which on steps are a resolution
-SPIKE = 12.0  # deviations from the neighbours' median
 FAST_S = 0.005  # between rows: within two of them no drive goes out and comes back, however little
 LEAST_SPIKE_MM = 0.1  # the same between rows that are further apart: none goes so far
 QUIET = 0.1  # of the rows, which even busy moves leave without a corner
-NEIGHBOURS = 3  # rows on either side, so that two that follow each other do not hide each other
 
 
 def rows_floor(channels: Sequence[Floats]) -> float:
@@ -35,23 +33,23 @@ def rows_floor(channels: Sequence[Floats]) -> float:
 
 
 def spikes(y: Floats, least: float) -> np.ndarray:
-    """Mask (n,) of rows above or below both neighbourhoods by more than SPIKE deviations, `least`, and any usual step.
+    """Mask (n,) of rows above or below both neighbourhoods by more than FAR_OFF deviations, `least`, and any usual step.
 
     A row's deviation is that of its neighbours, and at least the resolution, by which a standing axis flickers.
     """
     rows = np.flatnonzero(np.isfinite(y))
     out = np.zeros(len(y), bool)
-    if len(rows) < 4 * NEIGHBOURS:
+    if len(rows) < 4 * IN_A_ROW:
         return out
     known = y[rows]
-    padded = np.concatenate([known[:1].repeat(NEIGHBOURS), known, known[-1:].repeat(NEIGHBOURS)])
-    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS), axis=1)
-    before, behind = median[: len(known)], median[NEIGHBOURS + 1 :]
+    padded = np.concatenate([known[:1].repeat(IN_A_ROW), known, known[-1:].repeat(IN_A_ROW)])
+    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, IN_A_ROW), axis=1)
+    before, behind = median[: len(known)], median[IN_A_ROW + 1 :]
     over = np.maximum(known - np.maximum(before, behind), np.minimum(before, behind) - known)
     off = known - 0.5 * (before + behind)
     step = 3.0 * float(np.quantile(np.abs(np.diff(known)), 0.95))
     scatter = max(float(median_abs_deviation(off, scale="normal")), rows_floor([known]))
-    out[rows] = over > max(SPIKE * scatter, least, step)
+    out[rows] = over > max(FAR_OFF * scatter, least, step)
     return out
 
 

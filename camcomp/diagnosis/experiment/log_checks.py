@@ -8,9 +8,10 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from camcomp.diagnosis.experiment.logged import Logged
-from camcomp.diagnosis.fit.floor import LEAST_ROWS
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
+from camcomp.diagnosis.model.noise import LEAST_VALUES
+from camcomp.diagnosis.model.readings import ROWS_APART
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.statics.arm import ARM_LENGTH
@@ -26,7 +27,6 @@ _TORQUES = {1e-3: "N m", 1e3: "mN mm"}
 SAME_TIME = (0.7, 1.4)  # ratio of durations of log and program after the change of unit
 SAME_FORCE = (0.1, 10.0)  # ratio of measured to modelled force after the change of unit, which is a factor of 1000
 AXES = ("x", "y", "z")
-ROWS_APART = (1, -1, 2, -2, 3, -3)  # between channels of one log
 LATEST_S = 0.05  # largest clock offset and largest lateness of a drive
 _HOT_C = 150.0
 _STRONG_N = 20.0
@@ -75,8 +75,8 @@ def check_clock(name: str, measured: Measured) -> None:
 def check_length(log: Logged, due_s: float) -> None:
     """Raise CC409 for a run with too few rows, CC407 for times in another unit; due_s: duration of the program."""
     rows = len(log.measured.time)
-    if rows < LEAST_ROWS:
-        message = f"run '{log.run}': the log has {rows} row{'s' if rows > 1 else ''}, {LEAST_ROWS} are the least"
+    if rows < LEAST_VALUES:
+        message = f"run '{log.run}': the log has {rows} row{'s' if rows > 1 else ''}, {LEAST_VALUES} are the least"
         raise ConfigError("CC409", message, at=Location(log.file, rows + 1, 1))
     took = float(log.measured.time[-1] - log.measured.time[0])
     for factor, unit in _TIMES.items():
@@ -133,7 +133,7 @@ def check_followed(log: Logged, distance: Floats, agreement: float, aside_mm: fl
 def check_lines(log: Logged, away: Floats) -> None:
     """Raise CC406 for line numbers of other positions: away (n,) mm of path length from the line of a row."""
     known = away[np.isfinite(away)]
-    if len(known) >= LEAST_ROWS and np.median(known) > FAR_MM:
+    if len(known) >= LEAST_VALUES and np.median(known) > FAR_MM:
         message = (
             f": the rows are {np.median(known):.3g} mm of way from the lines that they name: the column line looks "
             "like that of another program, or like numbers N in place of lines counted from 1"
@@ -153,7 +153,7 @@ def check_rows_together(log: Logged, *, what: str, found: Floats, due: Floats, o
         rows = np.arange(max(-by, 0), len(due) - max(by, 0))
         step = np.linalg.norm(due[np.minimum(rows + by + 1, len(due) - 1)] - due[rows + by], axis=1)
         apart = (found[rows] - due[rows + by])[(step > 0.0) & np.isfinite(found[rows]).all(axis=1)]
-        if len(apart) < LEAST_ROWS:
+        if len(apart) < LEAST_VALUES:
             return np.inf
         return float(np.median(np.linalg.norm(apart - np.median(apart, axis=0), axis=1)))  # less the constant part
 

@@ -12,12 +12,11 @@ from typing import Literal
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
-from camcomp.diagnosis.model.noise import REPEATABILITY_MM, resolution_of, rounding_noise
+from camcomp.diagnosis.model.noise import LEAST_VALUES, REPEATABILITY_MM, resolution_of, rounding_noise
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.seams import missing_rows
 
 CLIPPED = 6.0  # robust deviations beyond which a difference of rows is no noise
-LEAST_ROWS = 10  # of a run with a program, for an estimate of its noise
 LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
 RIGID_MM_PER_N = 1e-4  # spring of a drive for which none is stated
 STRETCH, LEAST_STRETCHES = 16, 8  # differences of rows that make a stretch, and stretches that tell a quiet one
@@ -104,7 +103,7 @@ def steady_scatter(values: Floats, time: Floats) -> float:
 def _bends(values: Floats, time: Floats) -> Floats | None:
     """Second differences in units of the noise, those far off cut; None where rows are too few."""
     known = np.flatnonzero(np.isfinite(values))
-    if len(known) < LEAST_ROWS:
+    if len(known) < LEAST_VALUES:
         return None
     x, near = values[known], ~missing_rows(time[known])
     bend = (x[2:] - 2.0 * x[1:-1] + x[:-2])[near[1:] & near[:-1]] / np.sqrt(6.0)

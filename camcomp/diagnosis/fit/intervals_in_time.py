@@ -11,12 +11,12 @@ from math import comb
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
+from camcomp.diagnosis.model.noise import IN_A_ROW
 from camcomp.diagnosis.model.window import LONGEST, best_window
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats, Ints
 
 LEAST_GAIN = 60.0  # chi-square of one interval; the best of 1e5 by chance is 20
-LEAST_ROWS = 5
 _BLOCKS = 60
 _JUMPS = 5  # of a leftover, between which an interval is tried
 
@@ -48,7 +48,7 @@ def likely_intervals(
         order = np.argsort(places(k), kind="stable")
         at = run.run_path.started + run.run_path.time[0] + places(k)[order] * np.ptp(run.run_path.time)
         instants, starts = np.unique(at, return_index=True)
-        if len(instants) < 4 * LEAST_ROWS:
+        if len(instants) < 4 * IN_A_ROW:
             continue
         columns = always[k][:, np.arange(always[k].width)][order]
         gain, i, j = max(_best(column, rest[k][order], starts) for column in columns.T)
@@ -56,7 +56,7 @@ def likely_intervals(
             rise = getattr(candidate.effect, "RISE_S", 0.0)
             jumps = _jumps(np.add.reduceat(rest[k][order] ** 2, starts))
             pairs = [(i, j), *(pair for pair in combinations(sorted({i, j, *jumps}), 2) if pair != (i, j))]
-            fair = [(i, j) for i, j in pairs if LEAST_ROWS <= j - i <= LONGEST * len(instants)]
+            fair = [(i, j) for i, j in pairs if IN_A_ROW <= j - i <= LONGEST * len(instants)]
             best = gain, [_between(instants, i, j, rise) for i, j in fair]
     return [{start: begin, end: over} for begin, over in best[1]]
 
@@ -70,12 +70,12 @@ def _between(instants: Floats, i: int, j: int, rise: float) -> tuple[float, floa
 
 
 def _jumps(energy: Floats) -> list[int]:
-    """The instants (of n) with the largest jumps of a residual, at least LEAST_ROWS rows apart."""
+    """The instants (of n) with the largest jumps of a residual, at least IN_A_ROW rows apart."""
     left, out = energy.copy(), list[int]()
-    for _ in range(min(_JUMPS, len(left) // LEAST_ROWS)):
+    for _ in range(min(_JUMPS, len(left) // IN_A_ROW)):
         at = int(np.argmax(left))
         out.append(at)
-        left[max(at - LEAST_ROWS, 0) : at + LEAST_ROWS + 1] = 0.0
+        left[max(at - IN_A_ROW, 0) : at + IN_A_ROW + 1] = 0.0
     return out
 
 
@@ -85,7 +85,7 @@ def _best(column: Floats, rest: Floats, starts: Ints) -> tuple[float, int, int]:
     """
     n, ends = len(starts), np.append(starts, len(rest))
     edges, near = np.unique(np.linspace(0, n, min(_BLOCKS, n) + 1).astype(np.int64)), int(np.ceil(n / _BLOCKS))
-    shortest = LEAST_ROWS * len(rest) // n
+    shortest = IN_A_ROW * len(rest) // n
     for _ in range(3):
         motion, left = column[:, None], rest[:, None]
         gain, *rows = best_window(motion, left, np.zeros((*motion.shape, 0)), ends[edges], shortest)

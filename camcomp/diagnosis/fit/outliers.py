@@ -10,14 +10,12 @@ from scipy.ndimage import median_filter
 from scipy.stats import norm
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
-from camcomp.diagnosis.fit.floor import LEAST_ROWS
+from camcomp.diagnosis.model.noise import FAR_OFF, IN_A_ROW, LEAST_VALUES, MANY
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Bools, Floats
 
-OFF = 8.0  # robust deviations from the rows beside it by which a single row is off
-SHORT, LONG = 7, 61  # rows of the running medians
+LONG = 61  # rows of the running median of several rows that are off
 GROSS = 160.0  # robust deviations from the rows around it by which several rows in a row are off
-MANY = 0.02  # of the rows: more are no outliers
 FAR_MM = 5.0  # no machine is wrong by so much from one row to the next
 HEAVY = 3.5  # robust deviations beyond which a reading counts less
 TINY = 1e-12  # mm, rad, N: rounding of zero
@@ -31,7 +29,7 @@ def outlying(bench: Bench) -> list[Bools]:
         bad = np.zeros(gap.shape, bool)
         for c, x in enumerate(gap.T):
             known = np.flatnonzero(np.isfinite(x))
-            if len(known) >= LEAST_ROWS and run.run_path.ordered:
+            if len(known) >= LEAST_VALUES and run.run_path.ordered:
                 bad[known, c] = _jumping_off(x[known])
         if run.run_path.ordered:
             bad[:, :3] |= _sprung_off(gap[:, :3])[:, None]
@@ -44,20 +42,25 @@ def outlying(bench: Bench) -> list[Bools]:
 
 
 def _jumping_off(x: Floats) -> Bools:
-    beside = x - median_filter(x, SHORT, mode="mirror")
+    beside = _beside(x)
     scale = 1.4826 * float(np.median(np.abs(beside)))
-    single = np.abs(beside) > OFF * max(scale, TINY)
+    single = np.abs(beside) > FAR_OFF * max(scale, TINY)
     around = x - median_filter(x, min(LONG, len(x)), mode="mirror")
     wide = 1.4826 * float(np.median(np.abs(around)))
     # what mostly stands still is told in steps; smaller ones are those of arithmetic
     steps = np.abs(around[np.abs(around) > TINY])
-    least = GROSS * max(wide, scale) if max(wide, scale) > TINY else OFF * float(np.min(steps, initial=np.inf))
+    least = GROSS * max(wide, scale) if max(wide, scale) > TINY else FAR_OFF * float(np.min(steps, initial=np.inf))
     gross = np.abs(around) > least
     # a curve is its own median, and a machine may move from row to row: only what is far beyond what most rows do
     if scale <= TINY or single.mean() > MANY:
         most = float(np.quantile(np.abs(beside), 1.0 - MANY))
-        single = np.abs(beside) > OFF / norm.isf(0.5 * MANY) * most if most > TINY else np.zeros_like(single)
+        single = np.abs(beside) > FAR_OFF / norm.isf(0.5 * MANY) * most if most > TINY else np.zeros_like(single)
     return np.asarray(single | (gross if gross.mean() < 2.0 * MANY else False))
+
+
+def _beside(x: Floats) -> Floats:
+    """Values (n,) minus their running median, which IN_A_ROW of them do not move."""
+    return np.asarray(x - median_filter(x, 2 * IN_A_ROW + 1, mode="mirror"))
 
 
 def _sprung_off(gap: Floats) -> Bools:
@@ -67,7 +70,7 @@ def _sprung_off(gap: Floats) -> Bools:
     """
     known = np.flatnonzero(np.isfinite(gap).all(axis=1))
     x, out = gap[known], np.zeros(len(gap), bool)
-    if len(known) < LEAST_ROWS:
+    if len(known) < LEAST_VALUES:
         return out
     far = np.linalg.norm(x - np.median(x, axis=0), axis=1) > FAR_MM
     springs = np.concatenate([[False], np.linalg.norm(np.diff(x, axis=0), axis=1) > FAR_MM, [False]])
@@ -105,7 +108,7 @@ def _gone_along(tip: Floats, encoder: Floats, slopes: Floats, bad: Bools) -> Boo
     edges = np.flatnonzero(np.diff(bad.any(axis=1), prepend=False, append=False))
     out = np.zeros(len(tip), bool)
     for first, end in zip(edges[::2], edges[1::2], strict=True):
-        out[first:end] = end - first >= SHORT // 2 and odds[first:end].sum() > 2.0 * EQUAL_LOG_ODDS
+        out[first:end] = end - first >= IN_A_ROW and odds[first:end].sum() > 2.0 * EQUAL_LOG_ODDS
     return out
 
 
@@ -125,9 +128,9 @@ def tails(bench: Bench) -> list[Floats]:
         weight = np.ones_like(gap)
         for c, x in enumerate(gap.T):
             known = np.flatnonzero(np.isfinite(x))
-            if len(known) < LEAST_ROWS or not run.run_path.ordered:
+            if len(known) < LEAST_VALUES or not run.run_path.ordered:
                 continue
-            beside = x[known] - median_filter(x[known], SHORT, mode="mirror")
+            beside = _beside(x[known])
             scale = 1.4826 * float(np.median(np.abs(beside)))
             if scale > 0.0:
                 weight[known, c] = np.maximum(np.abs(beside) / (HEAVY * scale), 1.0)

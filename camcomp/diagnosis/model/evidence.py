@@ -27,11 +27,11 @@ from camcomp.diagnosis.model.group import (
     normal_equations,
     sum_grams,
 )
+from camcomp.diagnosis.model.noise import HEALTHY
 from camcomp.diagnosis.statistics.cause_sets import SIZES
 from camcomp.ground.datatypes import Floats, Ints
 
 WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: effect of a cause on the channels
-SMALL = 0.08  # of the noise: effect of a healthy machine's small error; sixty of them make 0.6
 LONG = 20  # columns: a longer candidate has no small errors
 FREE = 1e-6  # precision of nuisances in units of their columns
 ABSENT = 1e30  # precision of a column that takes no part
@@ -131,7 +131,7 @@ class LinearModel:
         out = np.zeros(self.layout.effects)
         for c in (each for each in self.candidates if len(each.columns) <= LONG):
             own = [j for j in c.columns if self.size[j] > 0.0 and not (self.bounds.shaped[j] and c.ways > 1.0)]
-            out[own] = np.maximum(out[own], SMALL / (self.size[own] * np.sqrt(len(c.columns) * c.ways)))
+            out[own] = np.maximum(out[own], HEALTHY / (self.size[own] * np.sqrt(len(c.columns) * c.ways)))
         return out
 
     def family(self, name: str) -> tuple[Ints, Floats]:

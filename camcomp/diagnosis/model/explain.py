@@ -32,7 +32,6 @@ from camcomp.ground.datatypes import Floats
 
 ROUNDS = 6  # of discrepancies, one more each
 STATED = 0.08  # log deviation of a stated noise: instruments know themselves to an eighth in the square
-EXCESS = 1.2  # of the floor: noise above it is unmodelled
 NOISES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0, 9.0)  # factors on the floor
 
 
@@ -47,10 +46,16 @@ class KnownNoise:
 
     def log_prior(self, factor: float) -> float:
         """Log prior of a factor on the noise, noise as stated against unmodelled excess of any size."""
+        return float(np.logaddexp(*self._log_priors(factor)))
+
+    def unmodelled(self, factor: float) -> float:
+        """Probability that a factor on the noise is unmodelled excess."""
+        return float(np.exp(self._log_priors(factor)[1] - self.log_prior(factor)))
+
+    def _log_priors(self, factor: float) -> tuple[float, float]:
         spread = np.hypot(STATED, 1.0 / np.sqrt(2.0 * self.freedom))
-        inside = -0.5 * (log(factor) / spread) ** 2
-        outside = log(UNKNOWN / (1.0 - UNKNOWN)) - log(len(NOISES)) if factor > EXCESS else -np.inf
-        return float(np.logaddexp(inside, outside))
+        outside = log(UNKNOWN / (1.0 - UNKNOWN)) - log(len(NOISES)) if factor > 1.0 else -np.inf
+        return float(-0.5 * (log(factor) / spread) ** 2), outside
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -135,7 +140,7 @@ def explain(
         if best is None or options[best][1] <= max(weighed[background].values()):
             break
         background = best
-    return posterior_of(model, weighed, UNKNOWN if noise is None else 0.0)
+    return posterior_of(model, weighed, noise)
 
 
 def log_prior(model: LinearModel, background: Background, noise: KnownNoise | None) -> float:
@@ -213,13 +218,16 @@ def best_noise(
 
 
 def posterior_of(
-    model: LinearModel, weighed: dict[Background, dict[Members, float]], hidden: float = 0.0
+    model: LinearModel,
+    weighed: dict[Background, dict[Members, float]],
+    noise: KnownNoise | None = KnownNoise(),
 ) -> Explanation:
     """The posterior over everything that was weighed; sets of the same places count as one.
 
-    hidden: probability that the fitted noise is a discrepancy of any form. The data do not change it where the noise is not
-    known, and beside such a discrepancy they do not determine causes.
+    Where the noise is not known it may be a discrepancy of any form: the data do not change the probability of that, and
+    beside such a discrepancy they do not determine causes.
     """
+    hidden = UNKNOWN if noise is None else 0.0
     flat = [(b, m, v) for b, own in weighed.items() for m, v in own.items()]
     value = np.array([v for _, _, v in flat])
     p = (1.0 - hidden) * np.exp(value - logsumexp(value))
@@ -228,8 +236,10 @@ def posterior_of(
     merged: dict[frozenset[Place], tuple[Members, float, float]] = {}
     unknown = hidden
     for (background, members, _), each in zip(flat, p.tolist(), strict=True):
-        if background.unknown or background.noise > EXCESS:
+        if background.unknown:
             unknown += each
+        elif noise is not None:
+            unknown += each * noise.unmodelled(background.noise)
         for name, _ in background.families:
             families[name] = families.get(name, 0.0) + each
         own = frozenset(model.candidates[i].place for i in members)

@@ -1,4 +1,4 @@
-"""Noise of a recording from its resolution: sd = step / sqrt(12)."""
+"""Noise of a recording: sizes that all kinds of log share, outliers, and the noise of a resolution, sd = step / sqrt(12)."""
 
 from __future__ import annotations
 
@@ -14,13 +14,16 @@ MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause,
 AT_FLOOR = (
     1.5  # of the square of the noise floor: what is left on unseen rows is the floor where it is surely below that
 )
-LEAST_ROWS = 12  # distinct values from which on a resolution is determined
+LEAST_VALUES = 12  # of a deviation or a resolution: that of n values is known to 1 / sqrt(2 n), a fifth
+FAR_OFF = 12.0  # robust deviations from its neighbours, or from a model, by which a value is no reading of the machine
+IN_A_ROW = 3  # values so far off, one after the other: no mistakes, something lasts
+MANY = 0.03  # of the values: more that are so far off are no mistakes
 
 
 def resolution_of(values: Floats) -> float:
     """Step of a recording: all distances between the values (n,) are multiples of it, within a twentieth; 0: none."""
     each = np.unique(values[np.isfinite(values)])
-    if len(each) < LEAST_ROWS:
+    if len(each) < LEAST_VALUES:
         return 0.0
     steps = np.diff(each)
     steps = steps[steps > 1e-9]  # less is rounding of arithmetic

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from camcomp.ground.errors import ConfigError, Location
 
 BETTER = 0.2  # of the misfit: what another reading has to leave to be what was meant
+ROWS_APART = (1, -1, 2, -2, 3, -3)  # by which columns of one log may have slipped
 Reading = tuple[str, str, Callable[[], float]]  # rule, what the log looks like, misfit
 
 

@@ -18,8 +18,6 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 
 SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
 CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
-OWN = 0.5  # of its signal that no other member could take over, from which on a member is measured by that part alone
-NEAR = 0.5  # of what acts for a while: a row that it leaves nearer to nothing than this follows it
 SURE_SD = 3.0  # of the floor: what noise leaves of a row
 
 
@@ -121,7 +119,7 @@ def foretelling(problem: Problem, f: Fitted) -> Members:
 
 
 def followed(problem: Problem, f: Fitted, i: int) -> bool:
-    """Whether the rows for which a member acts follow it, those too that count less because they are far off or unsteady.
+    """Whether the rows for which a member acts are nearer to it than to nothing, those too that count less because they are far off or unsteady.
 
     Other runs tell nothing of what acts for a while. A piece of what goes on all the time is found where a few rows go one
     way by chance; those between them do not.
@@ -137,7 +135,7 @@ def followed(problem: Problem, f: Fitted, i: int) -> bool:
         size = np.linalg.norm(signal, axis=1)
         rest = np.sum(gap[:, :3] * signal, axis=1) / np.maximum(size, 1e-12)
         there = (size > 0.0) & np.isfinite(rest)
-        near.append(np.abs(rest[there]) < np.maximum(NEAR * size[there], SURE_SD * problem.floor.axis_mm))
+        near.append(np.abs(rest[there]) < np.maximum(0.5 * size[there], SURE_SD * problem.floor.axis_mm))
     rows = np.concatenate(near)
     return not len(rows) or float(rows.mean()) >= CONFIRMED
 
@@ -153,7 +151,7 @@ def _gain(change: Floats, own: Floats) -> float:
 def _own(problem: Problem, f: Fitted, members: Members, i: int) -> Floats:
     """Squares per row (runs,) that a member explains and the other members cannot.
 
-    Where they would take over more than OWN of it, the others may be what is there, and all that it does counts.
+    Where they would take over more of it than that, the others may be what is there, and all that it does counts.
     """
     index, at = problem.member_columns((i,)), problem.member_columns(f.members)
     others = problem.member_columns(tuple(each for each in members if each != i))
@@ -162,7 +160,7 @@ def _own(problem: Problem, f: Fitted, members: Members, i: int) -> Floats:
     alone = signal.copy()
     alone[others] -= np.linalg.solve(A[np.ix_(others, others)] + np.eye(len(others)), A[others] @ signal)
     whole, own = ([float(each @ g.A @ each) / g.rows for g in f.grams] for each in (signal, alone))
-    return np.array(own if sum(own) > OWN * sum(whole) else whole)
+    return np.array(own if sum(own) > 0.5 * sum(whole) else whole)
 
 
 def _left_unseen(problem: Problem, f: Fitted, members: Members) -> Floats:
