@@ -11,7 +11,7 @@ import numpy as np
 
 from camcomp.diagnosis.answer.held_out import shrinkage_of
 from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, run_gaps
-from camcomp.diagnosis.answer.minor import minor_effects, outlying_rows
+from camcomp.diagnosis.answer.minor import MOST_LISTED, minor_effects, outlying_rows
 from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.answer.stretch import with_stretches
 from camcomp.diagnosis.fit.bench import Bench, Run
@@ -60,7 +60,6 @@ from camcomp.model.motion.twin import Twin
 
 ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
 UNLOGGED_RISE = (0.3, 3.0)  # times the 10 K that are taken where no temperature is logged: by how much drives warm up
-RIVALS = 8  # sets that one experiment is asked to tell from the answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +143,7 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
         return explore(problem, found.left[found.unknown_in].labels, job)
     sets = found.sets
     best = sets.first
-    close = [best, *sets.rivals[:RIVALS]]
+    close = [best, *sets.rivals[: MOST_SETS - 1]]
     if len(close) == 1:
         close += [j for j in np.argsort(-sets.probability).tolist() if j != best][: MOST_SETS - 1]
     # rivals explain equally well: a low prior does not exclude them
@@ -334,7 +333,7 @@ def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[SpectralLine]
         null = problem.refit(())
         at_null = residual_tests(problem, null, firm_prior(problem))
         labels = max(at_null.values(), key=lambda each: each.energy).labels if at_null else ()
-    return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:6] if share > MINOR**2]
+    return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:MOST_LISTED] if share > MINOR**2]
 
 
 # -- shrinkage --------------------------------------------------------------------------------------------------------

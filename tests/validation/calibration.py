@@ -20,12 +20,13 @@ import numpy as np
 
 import camcomp
 from camcomp.diagnosis.arm.case import POSES_MAP, UNKNOWN_MAP
-from camcomp.diagnosis.model.calibration import MOST_LOG_ODDS, CalibrationMap
+from camcomp.diagnosis.model.calibration import CalibrationMap
 from tests.validation import scoring
 from tests.validation.generators import FOR_GENERATORS
 from tests.validation.recordings import recording
 
 LEAST_PER_LEVEL = 20  # causes of one level of the map: a rate known to a tenth
+MOST_LOG_ODDS = 20.0  # beyond it a posterior is as good as certain
 BELOW = 8  # log odds: knots of the map where no experiment was, one each
 SHAPES = 50.0  # half widths: intervals of scanned shapes have next to no width, and no factor mends them
 FIRST = 90_000  # development seeds; the bench draws its seeds from 10 000 000 on

@@ -12,7 +12,7 @@ from camcomp.diagnosis.result.types import MinorEffect, Outlier
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
 
-MOST_LISTED = 8
+MOST_LISTED = 8  # minor effects, or drivers of a gap
 
 
 def minor_effects(problem: Problem, f: Fitted) -> tuple[MinorEffect, ...]:

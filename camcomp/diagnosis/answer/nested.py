@@ -5,11 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.model.classes import MOST_SETS
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, parts_of, temperature_of, total
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
-
-RIVALS = 4  # sets beside the answer that another choice of runs might have led to: the contract lists as many
 
 
 def causes_without(
@@ -23,7 +22,7 @@ def causes_without(
     runs = range(len(problem.bench.runs))
     if len(runs) == 1 or not best.members:
         return [_by_candidate(problem, best, best.members, best.theta)] * len(runs)
-    rivals = [fits[j] for j in np.argsort(-probability) if _is_rival(fits[j].members, best.members)][:RIVALS]
+    rivals = [fits[j] for j in np.argsort(-probability) if _is_rival(fits[j].members, best.members)][:MOST_SETS]
     tried = [(best, part) for part in parts_of(best.members)] + [(f, f.members) for f in rivals]
     temperature = temperature_of(best, problem.prior, problem.member_columns(best.members))
 

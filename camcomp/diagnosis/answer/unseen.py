@@ -12,7 +12,6 @@ from camcomp.diagnosis.result.types import ShrinkageStep, UnseenShrinkage
 from camcomp.diagnosis.statistics.shrinkage import log_ratio, of_one_more, scatter
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
-PARTS = 16  # regions of postures or stretches of time of a run
 PARTS_OF_ONE = 4  # that a run visits, at least: it differs from the next one by as much as means of these
 USUAL_SPREAD = 0.3  # by which runs of programs differ in the logarithm of the ratio: some cut, some hardly move an axis
 USUAL_RUNS = 2  # that this is worth beside those at hand

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
+from camcomp.diagnosis.answer.minor import MOST_LISTED
 from camcomp.diagnosis.arm.case import PoseCase
 from camcomp.diagnosis.arm.curves import curve_cause
 from camcomp.diagnosis.arm.linear import covariate_of
@@ -16,7 +17,7 @@ from camcomp.diagnosis.arm.poses import CURVE
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
 from camcomp.diagnosis.model.evidence import Background
-from camcomp.diagnosis.model.folds import without_nuisances
+from camcomp.diagnosis.model.folds import REGIONS, without_nuisances
 from camcomp.diagnosis.model.group import split_regions
 from camcomp.diagnosis.model.noise import HEALTHY, LEAST_VALUES, MINOR
 from camcomp.diagnosis.model.verdict import VerdictInputs, decide
@@ -36,10 +37,6 @@ from camcomp.diagnosis.result.types import (
 from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
 from camcomp.ground.datatypes import Floats
-
-PLACES = 8  # parts of the workspace
-STRETCHES = 16  # of a campaign's time
-MOST_DRIVERS = 6  # that are listed
 
 
 def gap(gaps: Sequence[Floats], floor: TipFloor | None) -> GapSize:
@@ -206,7 +203,7 @@ def drivers(case: PoseCase, intervals: Sequence[IntervalShare]) -> tuple[Driver,
     if found.background.process is not None and found.background.process.over == "time":
         shares.setdefault("time", max(shares.values(), default=0.0))
     order = sorted(shares, key=lambda name: -shares[name])
-    return tuple(Driver(covariate=name, share=round(shares[name], 4)) for name in order[:MOST_DRIVERS])
+    return tuple(Driver(covariate=name, share=round(shares[name], 4)) for name in order[:MOST_LISTED])
 
 
 def _energy(parts: Sequence[Floats]) -> float:
@@ -222,8 +219,8 @@ def _energy_beside(case: PoseCase, background: Background) -> float:
 
 
 def windows(time: Floats) -> list[np.ndarray]:
-    """Indices of at most STRETCHES stretches of time of LEAST_VALUES poses or more."""
-    count = min(STRETCHES, len(time) // LEAST_VALUES)
+    """Indices of at most REGIONS stretches of time of LEAST_VALUES poses or more."""
+    count = min(REGIONS, len(time) // LEAST_VALUES)
     return list(np.array_split(np.argsort(time, kind="stable"), count)) if count > 1 else []
 
 
@@ -269,7 +266,7 @@ def _places_above(case: PoseCase) -> tuple[PlaceShare, ...]:
     bench = case.bench
     point = np.concatenate([bench.standing(bench.campaigns[k], ()).hung.point for k in bench.own])
     square = np.concatenate([(r**2).sum(axis=1) for r in case.rest])
-    group = split_regions(point, PLACES)
+    group = split_regions(point, REGIONS)
     parts = [np.flatnonzero(group == g) for g in np.unique(group)]
     whole = max(float(square.sum()), 1e-300)
     out = []

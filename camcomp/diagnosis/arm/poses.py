@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.arm.registration import Registration, nuisance_columns, register
+from camcomp.diagnosis.fit.bench import SHARE_OF_SCALE
 from camcomp.diagnosis.model.group import Group
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
@@ -26,7 +27,6 @@ from camcomp.model.statics.description import Actuator, Link, Robot
 from camcomp.model.statics.hanging import Hung, grown_way, hang, tool_wrench
 from camcomp.model.statics.masses import mass_loads
 
-_SHARE_OF_SCALE = 0.05  # step of a difference
 _SAME_STEP = 1e-6  # times in equal steps of 1 are row numbers
 _JOINT_STEP = 1e-5  # rad or mm
 CURVE = "joint_curve"
@@ -285,10 +285,10 @@ class ArmBench:
             if is_of_drive(columns[j]) and j not in amounts:
                 X[:, :, j] = self._drive_motion(campaign, joints, columns[j])
                 continue
-            moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + _SHARE_OF_SCALE})
+            moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + SHARE_OF_SCALE})
             if columns[j].shape and j not in amounts:  # another shape of the same place may act
-                moved = [*causes, *combined(columns, {j: _SHARE_OF_SCALE})]
-            X[:, :, j] = (self.standing(campaign, moved).tips(frame) - here) / _SHARE_OF_SCALE
+                moved = [*causes, *combined(columns, {j: SHARE_OF_SCALE})]
+            X[:, :, j] = (self.standing(campaign, moved).tips(frame) - here) / SHARE_OF_SCALE
         return X
 
     def _drive_motion(self, campaign: Poses, joints: Floats, column: Column) -> Floats:

@@ -25,7 +25,7 @@ from camcomp.diagnosis.arm.temporary_offsets import temporary_offsets
 from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrinkage, unseen_poses, without_far_judged
 from camcomp.diagnosis.model.discrepancy import residuals
 from camcomp.diagnosis.model.evidence import Background
-from camcomp.diagnosis.model.explain import Explanation, KnownNoise, explain
+from camcomp.diagnosis.model.explain import STATED, Explanation, KnownNoise, explain
 from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
@@ -41,7 +41,6 @@ MOST_POSES = 1200  # of a campaign; more are drawn from
 CAMPAIGN_SEED = 20200714  # drawing has to give the same answer twice
 PASSES = 2  # of linearising about what was found
 MANY = 4  # causes from which on a joint that was shifted for a while is looked for
-CLOSE = 1.1  # ratio of floors that need no second look
 LOOSE_FRAME = 1e-3  # ratio of singular values of a frame's columns below which rows do not fix it
 
 
@@ -200,7 +199,7 @@ def settled_floor(
     beside = [bench.gap(k, acting) for k in range(len(bench.campaigns))]
     both = [tip_floor(bench.robot, bench.campaigns, each, stated) for each in (gaps, beside)]
     shown = min((one for one in both if one), key=lambda one: one.sd, default=least)
-    return shown, shown.sd > CLOSE * least.sd
+    return shown, bool(shown.sd > np.exp(STATED) * least.sd)
 
 
 def coarse_step(bench: ArmBench, sd: float) -> float:

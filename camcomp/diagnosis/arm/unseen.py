@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.answer.unseen import PARTS, JudgedRun, unseen_shrinkage
+from camcomp.diagnosis.answer.unseen import JudgedRun, unseen_shrinkage
 from camcomp.diagnosis.arm.case import PoseCase, named_rows
 from camcomp.diagnosis.arm.curves import covered, seen_angles
 from camcomp.diagnosis.arm.noise_floor import far_off
 from camcomp.diagnosis.arm.poses import CURVE, LEAST_POSES, ArmBench
 from camcomp.diagnosis.model.evidence import Background, LinearModel
-from camcomp.diagnosis.model.folds import Excess, excess_of, folds_of, held_out
+from camcomp.diagnosis.model.folds import REGIONS, Excess, excess_of, folds_of, held_out
 from camcomp.diagnosis.model.group import Group, split_regions
 from camcomp.diagnosis.model.search import MOST, search_sets
 from camcomp.diagnosis.result.types import FoundCause, UnknownCause, UnseenShrinkage
@@ -121,7 +121,7 @@ def shrinkage(
         stages, order, refitted = left_out_in_turn(unseen.model, case.explanation.background)
     runs = []
     for (k, rows), each in zip(unseen.units, stages, strict=True):
-        parts = split_regions(bench.campaigns[k].features[rows], min(PARTS, max(len(rows) // 8, 2)))
+        parts = split_regions(bench.campaigns[k].features[rows], min(REGIONS, max(len(rows) // 8, 2)))
         runs.append(JudgedRun([(r**2).sum(axis=1) for r in each], parts))
     share, rest = where_covered(case, named, unseen.units, [r.squares[-1] for r in runs])
     texts = ["frame of the instrument", "place of its target"] if refitted else []

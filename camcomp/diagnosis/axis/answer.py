@@ -7,11 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from camcomp.diagnosis.answer.unseen import PARTS, JudgedRun, unseen_shrinkage
+from camcomp.diagnosis.answer.unseen import JudgedRun, unseen_shrinkage
 from camcomp.diagnosis.axis.at_tip import held_errors, lever_mm, position_floor, whole_errors
 from camcomp.diagnosis.axis.findings import AxisFindings
 from camcomp.diagnosis.axis.gate import KNOWN
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
+from camcomp.diagnosis.model.folds import REGIONS
 from camcomp.diagnosis.result.types import (
     ActuatorGap,
     ActuatorShrinkage,
@@ -138,7 +139,7 @@ def shrinkage(judged: Sequence[Sequence[AxisFindings]], names: Sequence[str], ti
     runs = []
     for found in judged:
         before, after = (_unseen(found, tip, explained=each) for each in (False, True))
-        parts = np.arange(len(before)) * PARTS // len(before)
+        parts = np.arange(len(before)) * REGIONS // len(before)
         runs.append(JudgedRun([before, *[after] * max(len(effects), 1)], parts))
     return unseen_shrinkage(runs, effects, holdout=tuple(names), actuators=_actuators_unseen(judged))
 

@@ -16,7 +16,6 @@ from camcomp.ground.datatypes import Bools, Floats
 
 LATEST_S = 0.5  # of a loop
 ENCODER_BETTER = 0.8  # of what set-points leave of a channel: what encoders have to leave to be the motion
-SETPOINT_WIDE = (2, *WIDE)  # samples on either side of a local cubic through set-points
 SAME_MISFIT = (
     1.01  # of what the best width leaves: the narrowest that leaves no more is it, for wide cubics round corners off
 )
@@ -80,7 +79,7 @@ def motion_of(
         return _misfit(mine, told, [moves[k] for k in train], behind)
 
     def narrowest(paths: list[Floats], behind: float) -> list[AxisTravel]:
-        ways = [[travel(r.time, x, wide, behind) for r, x in zip(runs, paths, strict=True)] for wide in SETPOINT_WIDE]
+        ways = [[travel(r.time, x, wide, behind) for r, x in zip(runs, paths, strict=True)] for wide in (2, *WIDE)]
         left = [misfit(each) for each in ways]
         return next(each for each, own in zip(ways, left, strict=True) if own <= SAME_MISFIT * min(left))
 

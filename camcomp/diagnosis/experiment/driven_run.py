@@ -19,9 +19,11 @@ from camcomp.diagnosis.experiment.log_checks import (
     places,
 )
 from camcomp.diagnosis.experiment.logged import Logged
+from camcomp.diagnosis.fit.label_offsets import STEP_S
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
-from camcomp.diagnosis.fit.starts import BEGUN_ANEW
+from camcomp.diagnosis.fit.starts import BEGUN_ANEW, STOOD_MM
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, shelf
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
@@ -36,12 +38,8 @@ from camcomp.model.statics.arm import ARM_LENGTH
 from camcomp.model.trajectory.segments import merged
 
 SAMPLE_MM = 2.0  # distance of points of the program for comparisons
-GUESSED_MM = 1e-3  # by which an empty cell's actuator may stand beside the line between its neighbours; of a hinge, on an arm of 1 m
 STILL_S = 0.1  # duration from which a standstill at the end of a line may be idle time
-STILL_MM = 0.005
 MOST_PASSES = 8  # of the alignment with a deflected tip
-SETTLED_MM = 1e-3  # rms change of the deflection at which the passes end
-SOON_S = 1e-4  # time step of the tip's direction
 STANDING_MM_PER_S = 0.05
 
 
@@ -135,7 +133,7 @@ def _commanded(log: Logged, by: str) -> tuple[Floats, Bools]:
     if np.isfinite(logged).sum(axis=0).min() < 2:
         raise log.refusal("CC404", f": hardly a row holds the {by} of every actuator")
     guessed = [
-        _guessed(time, v, GUESSED_MM / (ARM_LENGTH if hinge else 1.0))
+        _guessed(time, v, REPEATABILITY_MM / (ARM_LENGTH if hinge else 1.0))
         for v, hinge in zip(logged.T, log.revolute, strict=True)
     ]
     return log.over_time(logged), np.column_stack(guessed)
@@ -272,7 +270,7 @@ def _agreement(path: Path, found: Aligned, tip: Floats) -> float:
     """Share of the moving rows in the direction of the program, 1 if no row moves."""
     at = _path_length(path, found)
     step = np.linalg.norm(np.diff(tip, axis=0), axis=1)
-    moving = step > STILL_MM
+    moving = step > STOOD_MM
     return float(np.mean(np.diff(at)[moving] > -0.5 * step[moving])) if moving.any() else 1.0
 
 
@@ -300,10 +298,10 @@ def _idle_or_not(forces: Forces, aligned: Aligned, program: _Program, tip: Float
     """Mask (n,) of rows at standstill where a cutting line begins or ends, so that its execution is uncertain."""
     path = program.track.path
     ends = (
-        np.min([np.linalg.norm(at[aligned.motion] - tip, axis=1) for at in (path.start, path.end)], axis=0) < STILL_MM
+        np.min([np.linalg.norm(at[aligned.motion] - tip, axis=1) for at in (path.start, path.end)], axis=0) < STOOD_MM
     )
     step = np.linalg.norm(np.diff(tip, axis=0), axis=1)
-    still = ends & np.concatenate([[False], step < STILL_MM]) & np.concatenate([step < STILL_MM, [True]])
+    still = ends & np.concatenate([[False], step < STOOD_MM]) & np.concatenate([step < STOOD_MM, [True]])
     out = np.zeros(len(tip), bool)
     edge = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     for a, b in zip(edge[::2], edge[1::2], strict=True):
@@ -332,12 +330,12 @@ def _led_by_tip(log: Logged, program: _Program) -> DrivenRun:
         loaded = twin.sense(run_path)[0].tip
         last, changed = changed, float(np.sqrt(np.mean(np.sum((loaded - tip - bend) ** 2, axis=1))))
         bend = loaded - tip
-        if beside < np.inf and (changed < SETTLED_MM or changed > last):
+        if beside < np.inf and (changed < REPEATABILITY_MM or changed > last):
             break
     unsure = ~known | (aligned.distance > ASIDE_MM) | _idle_or_not(forces, aligned, program, tip, measured.time)
     unsure |= _from_anywhere(way, on) | _at_corners(way, on, measured.time, log.acceleration)
-    later = Cause("time_sync", shelf.load("effects", "time_sync"), None, {"offset_s": -SOON_S})
-    velocity = (twin.sense(run_path, [later])[0].tip - loaded) / SOON_S
+    later = Cause("time_sync", shelf.load("effects", "time_sync"), None, {"offset_s": -STEP_S})
+    velocity = (twin.sense(run_path, [later])[0].tip - loaded) / STEP_S
     run_path = replace(run_path, feed_mm_per_min=program.feed, led=True, cut_ahead_min=_cut_ahead(program, aligned))
     guessed = np.zeros((len(tip), len(twin.actuators)), bool)
     return DrivenRun(

@@ -25,7 +25,6 @@ _TIMES = {1e3: "ms", 1e6: "us", 1.0 / 60.0: "minutes"}
 _FORCES = {1e-3: "kN", 1e3: "mN"}
 _TORQUES = {1e-3: "N m", 1e3: "mN mm"}
 SAME_TIME = (0.7, 1.4)  # ratio of durations of log and program after the change of unit
-SAME_FORCE = (0.1, 10.0)  # ratio of measured to modelled force after the change of unit, which is a factor of 1000
 AXES = ("x", "y", "z")
 LATEST_S = 0.05  # largest clock offset and largest lateness of a drive
 _HOT_C = 150.0
@@ -108,7 +107,7 @@ def check_forces(log: Logged, force: Floats, drives: Callable[[], Floats]) -> No
 
 
 def _is_scaled(found: Floats, due: Floats, factor: float, strong: float) -> bool:
-    """Whether measured values (n, c) correlate with modelled ones (n, c) above `strong`, and are about `factor` times these.
+    """Whether measured values (n, c) correlate with modelled ones (n, c) above `strong`, and are nearer to `factor` times these than to them.
 
     Unmodelled loads (weight, friction, inertia) may be far larger, but do not correlate with the modelled ones.
     """
@@ -117,7 +116,7 @@ def _is_scaled(found: Floats, due: Floats, factor: float, strong: float) -> bool
         return False
     y, x = found[known], due[known]
     size, modelled = float(np.sqrt(np.mean(y**2))), float(np.sqrt(np.mean(x**2)))
-    if modelled < strong or not SAME_FORCE[0] < size / (factor * modelled) < SAME_FORCE[1]:
+    if modelled < strong or abs(np.log(size / (factor * modelled))) > 0.5 * abs(np.log(factor)):
         return False
     return bool(np.mean(x * y) > np.sqrt(0.5) * size * modelled)  # half of the energy correlates
 

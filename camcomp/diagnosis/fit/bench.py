@@ -19,7 +19,7 @@ from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Reading, Twin
 from camcomp.model.statics.arm import ARM_LENGTH
 
-_SHARE_OF_SCALE = 0.05  # step of a difference
+SHARE_OF_SCALE = 0.05  # step of a difference, or of the logarithm of a spring or a force
 _KEPT = 12  # changed machines whose structures are kept per run
 
 
@@ -274,4 +274,4 @@ def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cau
 
 def step_of(parameter: Parameter) -> float:
     """Coordinate step of a difference."""
-    return parameter.scale * _SHARE_OF_SCALE if not parameter.scan else 1e-4 * max(abs(parameter.nominal), 1e-3)
+    return parameter.scale * SHARE_OF_SCALE if not parameter.scan else 1e-4 * max(abs(parameter.nominal), 1e-3)

@@ -10,7 +10,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
+from camcomp.diagnosis.fit.bench import SHARE_OF_SCALE, Bench, CandidateCause, Run, cause_of, step_of, thinned
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
@@ -32,7 +32,6 @@ CLOCK_RATE = 1e-5
 SPRING_LOG = 0.01  # one link's spring against its stated value
 MOST_HEALTHY = 0.3  # of an effect's typical size
 # tolerances beyond which it is no tolerance: at the tip no longer minor, by chance once in 5600
-_EDIT = 0.05  # step of the allowances' differences
 FORCE_TURN_RAD = 0.005  # direction of the cutting force in the plane of the work
 
 
@@ -283,19 +282,23 @@ def _allowances(bench: Bench) -> list[Nuisance]:
             edits.append((f"bars.{chain.name}", partial(_stiffer_bars, chain=chain.name)))
     if len(edits) <= 12:
         for label, edit in edits:
-            found.append((f"spring.{label}", SPRING_LOG, _difference(bench, f"spring.{label}", _Edit(edit), _EDIT)))
+            found.append(
+                (f"spring.{label}", SPRING_LOG, _difference(bench, f"spring.{label}", _Edit(edit), SHARE_OF_SCALE))
+            )
     if any(np.abs(run.run_path.node_force).max(initial=0.0) > 0 for run in bench.runs):
-        found.append(("force.direction", FORCE_TURN_RAD, _difference(bench, "force.direction", _Turn(), _EDIT)))
+        found.append(
+            ("force.direction", FORCE_TURN_RAD, _difference(bench, "force.direction", _Turn(), SHARE_OF_SCALE))
+        )
     return found
 
 
 def _stiffer_links(robot: Robot, chain: str) -> Robot:
-    f = float(np.exp(_EDIT))
+    f = float(np.exp(SHARE_OF_SCALE))
     return robot.edit(Link, lambda e: replace(e, stiffness=e.stiffness * f), chain)
 
 
 def _stiffer_bars(robot: Robot, chain: str) -> Robot:
-    f = float(np.exp(_EDIT))
+    f = float(np.exp(SHARE_OF_SCALE))
     return robot.edit(Parallelogram, lambda e: replace(e, bar_stiffness=e.bar_stiffness * f), chain)
 
 
@@ -312,12 +315,12 @@ class _Edit:
 
 
 class _Turn:
-    """The cutting force turned by _EDIT rad about machine z."""
+    """The cutting force turned by SHARE_OF_SCALE rad about machine z."""
 
     PARAMETERS = ()
 
     def on_load(self, load: Load, motion: object, p: Mapping[str, float]) -> Load:
-        c, s = np.cos(_EDIT), np.sin(_EDIT)
+        c, s = np.cos(SHARE_OF_SCALE), np.sin(SHARE_OF_SCALE)
         return Load(load.force @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), load.wrench)
 
 

@@ -7,13 +7,12 @@ nothing to differ from: then labels scatter about what they have in common, by a
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
+from scipy.special import ndtr, stdtrit
 
 from camcomp.ground.datatypes import Floats
 
 Label = str | int | None
 EFFECT_OF = {"clock": "time_sync", "clamping": "workpiece_frame"}  # what a label may differ by
-SIDE = 0.1587  # of a distribution beyond one standard deviation: Student's tells how little few labels know of theirs
 
 
 def apart(labels: Sequence[Label]) -> list[str | int]:
@@ -29,7 +28,7 @@ def scattering(labels: Sequence[Label]) -> bool:
 
 def scatter(offsets: Floats) -> float:
     """Upper bound of the standard deviation of offsets (labels,) about their mean, by Student's t for few labels."""
-    few = float(stdtrit(len(offsets) - 1, SIDE) / ndtri(SIDE))
+    few = -float(stdtrit(len(offsets) - 1, ndtr(-1.0)))
     return float(np.std(offsets, ddof=1)) * few
 
 

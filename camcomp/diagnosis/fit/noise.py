@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import chi2
 
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.floor import NoiseFloor, row_scatter
@@ -13,7 +14,6 @@ from camcomp.ground.datatypes import Floats
 
 TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
 UNSTEADY_S = 0.002  # more jitter than any log has
-MIDDLE = 0.4549  # median of a squared standard normal number
 REMEMBERED_S = 1.0  # for which slow noise lasts
 
 
@@ -165,14 +165,14 @@ def jitter(bench: Bench) -> float:
             more = float(np.median(v[high] ** 2) - np.median(v[low] ** 2))
             rest, push = float(np.median(rows[low])), float(np.median(rows[high]))
             if fast > 2.0 * slow and more > 0.0 and 0.0 < rest < (UNSTEADY_S * fast) ** 2:
-                found.append(((push - rest) / MIDDLE / more, more / rest))
+                found.append(((push - rest) / chi2.median(1) / more, more / rest))
     if not found:
         return 0.0
     gain, reach = np.array(found).T
     variance = min(
         weighted_median(gain, reach**2), UNSTEADY_S**2
     )  # the axes that would see it best have the most to say
-    return float(np.sqrt(variance)) if variance * MIDDLE * float(reach.max()) > MINOR else 0.0
+    return float(np.sqrt(variance)) if variance * chi2.median(1) * float(reach.max()) > MINOR else 0.0
 
 
 def _speed(bench: Bench, k: int) -> Floats:

@@ -16,7 +16,6 @@ from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion
 
-_FINER = 2 * ORDERS  # cosines over a travel, and over the time of all runs
 _MOVES = 1e-3  # of the highest speed, from which on something moves
 _RELAX_MM = (0.5, 3.0)
 KINDS = ("tip", "encoder", "drive", "dyno")
@@ -73,7 +72,7 @@ def _of_actuator(grounds: Sequence[Ground], j: int) -> dict[str, Functions]:
     motions = [g.motion for g in grounds]
     rates = [np.gradient(m.speed[:, j], m.time) if m.ordered and len(m.time) > 2 else 0.0 * m.time for m in motions]
     return {
-        "position": _smooth([m.encoder[:, j] for m in motions], _FINER),
+        "position": _smooth([m.encoder[:, j] for m in motions], 2 * ORDERS),
         "velocity": _smooth([m.speed[:, j] for m in motions]),
         "reversal": [[m.direction[:, j], *(_reversal(m, each, j) for each in _RELAX_MM)] for m in motions],
         "force": _smooth([g.drive[:, j] for g in grounds]),
@@ -88,7 +87,7 @@ def _of_time(grounds: Sequence[Ground]) -> dict[str, Functions]:
     begin = np.concatenate([[0.0], np.cumsum([float(t[-1]) for t in spent])])
     clocks = [
         _smooth([m.common for m in motions]), _smooth([t / max(float(t[-1]), 1e-9) for t in spent]),
-        _smooth([b + t for b, t in zip(begin, spent, strict=False)], _FINER),
+        _smooth([b + t for b, t in zip(begin, spent, strict=False)], 2 * ORDERS),
     ]  # fmt: skip
     each = zip(motions, *clocks, strict=True)
     return {
@@ -140,7 +139,7 @@ def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> Dictionar
                 "tip",
                 f"position:{name}",
                 range(3),
-                _smooth([g.tip[:, axis] for g in grounds], _FINER, REPEATABILITY_MM),
+                _smooth([g.tip[:, axis] for g in grounds], 2 * ORDERS, REPEATABILITY_MM),
             )
     on = np.array([channel for *_, channel, _ in found], int)
     mine = [np.flatnonzero(on == channel) for channel in range(6 + 2 * m)]

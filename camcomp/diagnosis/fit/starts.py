@@ -19,12 +19,10 @@ if TYPE_CHECKING:
     from camcomp.diagnosis.fit.bench import Bench
 
 Nuisance = tuple[str, float, list[Floats]]  # name, size, column (n, c) per run
-STARTED_MM = 0.1  # by which an actuator has to move before its play is taken up
-STOOD_MM = 5e-3  # by which it may have moved and stands: a digit of its encoder
+STOOD_MM = 5e-3  # by which what stands may move from row to row: a digit of its encoder
 UNDER_WAY = 8  # rows from the one to the other, in which its state is unknown
-START_MM = 0.1  # where its carriage may stand until then: play and guides as bad as they come
-START_N = 1000.0  # and how hard its guide may hold it there
-ALWAYS_MM = 0.005  # the same where it hardly ever moves: small, or all of its rows would be unknown
+START_MM = 0.1  # by which an actuator has to move before its play is taken up: play and guides as bad as they come
+START_N = 1000.0  # how hard its guide may hold its carriage until then
 ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
 STARTING_ROWS = 2
 SWING_S = 0.03  # times the speed with which a log begins: how far a loop may then stand from where it is told
@@ -48,7 +46,7 @@ def start_columns(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> 
             shift = np.zeros_like(bench.observed(r))
             shift[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
             begins = still.mean() < 1.0 - ALWAYS
-            width = START_MM if begins else ALWAYS_MM
+            width = START_MM if begins else STOOD_MM
             found.append((f"start.{run.name}.{a}", width / lever, only(r, shift)))
             if begins and run.measured.has("drive"):
                 held = np.zeros_like(shift)
@@ -108,7 +106,7 @@ def _standing(rho: Floats) -> tuple[Bools, Bools]:
     from one to the next is short.
     """
     moved = np.maximum.accumulate(np.abs(rho - rho[0]))
-    still = moved < STARTED_MM
+    still = moved < START_MM
     under_way = still & (moved > STOOD_MM)
     if under_way.sum() > UNDER_WAY:
         under_way = np.zeros(len(rho), bool)

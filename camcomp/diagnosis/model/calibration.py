@@ -17,8 +17,6 @@ import numpy as np
 
 from camcomp.diagnosis.statistics.probability import PLACES
 
-MOST_LOG_ODDS = 20.0  # beyond it a posterior is as good as certain
-
 
 @dataclass(frozen=True)
 class CalibrationMap:
@@ -32,8 +30,7 @@ class CalibrationMap:
         """The probability that is stated for one of the posterior, in between 0 and 1, both excluded."""
         p = min(max(probability, 1e-12), 1.0 - 1e-12)
         if self.log_odds:
-            odds = float(np.clip(np.log(p / (1.0 - p)), -MOST_LOG_ODDS, MOST_LOG_ODDS))
-            p = float(np.interp(odds, self.log_odds, self.probability))
+            p = float(np.interp(np.log(p / (1.0 - p)), self.log_odds, self.probability))
         return min(max(round(p, PLACES), 10.0**-PLACES), 1.0 - 10.0**-PLACES)
 
 

@@ -18,7 +18,6 @@ from camcomp.diagnosis.model.noise import AT_FLOOR
 from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.ground.datatypes import Floats
 
-LIKELY = 1.64  # standard errors: 95 %, one side
 ABOVE = 1.25  # of the floor's square: instruments know themselves to an eighth
 REGIONS = 16  # of positions or time, between which squares are compared
 
@@ -48,7 +47,7 @@ class Excess:
     @property
     def at_floor(self) -> bool:
         """Whether the residual is likely to be noise."""
-        return self.mean + LIKELY * self.error < AT_FLOOR
+        return self.mean + float(norm.isf(FALSE)) * self.error < AT_FLOOR
 
     @property
     def log10_chance(self) -> float:

@@ -18,7 +18,6 @@ from camcomp.model.motion.log_columns import LINE
 
 POSES_S = 0.5  # rows farther apart are poses, without interpolation
 _GAP = 5.0  # times the median step: longer steps are not interpolated
-_COMMON = 0.5  # of the shorter part's span: least overlap of a common clock
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +70,7 @@ def _on_time(parts: Sequence[SampledTable]) -> Joined:
     if len(times) < len(parts):
         _refuse(parts, "the parts have neither times nor equally many rows")
     start, end = max(t[0] for t in times), min(t[-1] for t in times)
-    if end - start < _COMMON * min(t[-1] - t[0] for t in times):
+    if end - start < 0.5 * min(t[-1] - t[0] for t in times):
         _refuse(parts, "the times of the parts have too little in common")
     within = [int(((t >= start) & (t <= end)).sum()) for t in times]
     candidates = [k for k, part in enumerate(parts) if part.leading] or list(range(len(parts)))

@@ -27,8 +27,7 @@ from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground import progress
 from camcomp.ground.datatypes import Floats
 
-SINGLES = 6  # single causes that are fitted in any case
-TRIED = 5  # sets fitted about a fit that are larger than it, and as many of those that are not
+TRIED = 5  # sets fitted about a fit that are larger than it, as many of those that are not, and of single causes
 ROUNDS = 6  # fits about which sets are searched
 HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
 
@@ -78,7 +77,7 @@ class FittedSets:
                 index = self.problem.member_columns(members)
                 theta = estimate(total(near.grams), self.problem.prior, index)[0][index]
             self.done[members] = self.problem.refit(members, theta)
-            progress.done(len(self.done) / (SINGLES + 2 * TRIED))
+            progress.done(len(self.done) / (3 * TRIED))
         return self.done[members]
 
     def search_near(self, near: Fitted) -> None:
@@ -98,7 +97,7 @@ class FittedSets:
                 if value > best - HOPELESS_LOG:
                     self.fit(members, near)
         if not near.members:
-            for _, members in scored(scale, [(i,) for i in self.every])[:SINGLES]:
+            for _, members in scored(scale, [(i,) for i in self.every])[:TRIED]:
                 self.fit(members)
 
     def answers(self, temperature: float = 1.0) -> list[Fitted]:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SCALES
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
@@ -18,7 +19,6 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 
 SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
 CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
-SURE_SD = 3.0  # of the floor: what noise leaves of a row
 
 
 def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, ResidualTest]:
@@ -135,7 +135,9 @@ def followed(problem: Problem, f: Fitted, i: int) -> bool:
         size = np.linalg.norm(signal, axis=1)
         rest = np.sum(gap[:, :3] * signal, axis=1) / np.maximum(size, 1e-12)
         there = (size > 0.0) & np.isfinite(rest)
-        near.append(np.abs(rest[there]) < np.maximum(0.5 * size[there], SURE_SD * problem.floor.axis_mm))
+        near.append(
+            np.abs(rest[there]) < np.maximum(0.5 * size[there], np.sqrt(INDISTINGUISHABLE) * problem.floor.axis_mm)
+        )
     rows = np.concatenate(near)
     return not len(rows) or float(rows.mean()) >= CONFIRMED
 

@@ -19,12 +19,11 @@ from camcomp.diagnosis.statistics.evidence import (
     log_sum,
     misfit,
 )
-from camcomp.diagnosis.statistics.probability import TEMPERATURE
+from camcomp.diagnosis.statistics.probability import EVEN, TEMPERATURE
 from camcomp.ground.datatypes import Floats
 
 Members = tuple[int, ...]
 PATTERN = 3  # targets of one effect from which on they may have one origin: springs of several joints are one thing that gives way
-SHARED = 0.5  # probability that they have
 ALL_PARTS = 3  # members up to which every part of a set is looked at; of larger ones all but one, each alone, and none
 SIZES = (0.45, 0.33, 0.13, 0.055, 0.022, 0.009, 0.004)  # prior probability of 0, 1, 2 ... causes
 
@@ -98,7 +97,7 @@ class CausePrior:
             more = 0.5 ** np.arange(of - PATTERN + 1)  # halving with every further target, and any so many of them
             these = more[len(mine) - PATTERN] / more.sum() / comb(of, len(mine))
             weights.append(float(self.weight[mine[0]]) + float(np.log(of * these)))
-        shared = len(groups) * float(np.log(SHARED)) + _in_any_order(weights)
+        shared = len(groups) * float(np.log(EVEN)) + _in_any_order(weights)
         return [*ways, (shared, [*(mine for mine, _ in groups), *((i,) for i in rest)])]
 
 

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camcomp.diagnosis.statistics.places import RunGap
+from camcomp.diagnosis.statistics.places import FALSE, RunGap
 from camcomp.ground.datatypes import Floats
 
-_CHANCE = 1e-3
 _TREND = 4  # terms of the polynomial that is taken out with the sines, and half waves of the longest period
-_PER_PERIOD = 2.0  # rows that a period needs, by the sampling theorem
 _STANDS_OUT = 0.2  # share of what the trend leaves
 _AT_ONCE = 1_000_000  # values held in memory
 
@@ -69,7 +67,7 @@ def screws(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLine]:
         span, step = float(np.ptp(x)), float(np.quantile(steps, 0.9))
         if span <= 0.0 or step <= 0.0 or len(y) < 30:
             continue
-        tried = np.arange(0.5 * _TREND / span, min(1.0 / (_PER_PERIOD * step), 2.0), 0.25 / span)
+        tried = np.arange(0.5 * _TREND / span, min(1.0 / (2.0 * step), 2.0), 0.25 / span)
         trend = _trend(x, sign)
         part = y, x, float(np.mean([r.thin for r in runs])), trend
         if (line := _line([part], tried, len(names))) is None:
@@ -93,7 +91,7 @@ def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLi
             continue
         spans = [float(np.ptp(t)) for _, t, *_ in parts]
         step = max(float(np.median(np.diff(t))) for _, t, *_ in parts)
-        tried = np.arange(0.5 * _TREND / min(spans), 1.0 / (_PER_PERIOD * step), 0.25 / max(spans))
+        tried = np.arange(0.5 * _TREND / min(spans), 1.0 / (2.0 * step), 0.25 / max(spans))
         if (line := _line(parts, tried, len(names))) is not None:
             size = np.mean([abs(_wave(y, t, line[0])) for y, t, *_ in parts])
             found.append(SpectralLine(name, line[0], float(size), line[1] / max(whole, 1e-300)))
@@ -119,9 +117,7 @@ def _line(
     common = np.median(shares, axis=0)
     best = int(np.argmax(common))
     chance = logs[best] + np.log(len(tried) * names)
-    return (
-        None if common[best] < _STANDS_OUT or chance > np.log(_CHANCE) else (float(tried[best]), float(energies[best]))
-    )
+    return None if common[best] < _STANDS_OUT or chance > np.log(FALSE) else (float(tried[best]), float(energies[best]))
 
 
 def _wave(y: Floats, x: Floats, f: float) -> complex:
