@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import combinations
 
 import numpy as np
 
 from camcomp.diagnosis.arm.registration import nuisance_columns, register
 from camcomp.diagnosis.fit.outliers import FAR_MM
 from camcomp.diagnosis.model.noise import LEAST_VALUES
-from camcomp.diagnosis.model.readings import ROWS_APART, Reading, refuse_as_read
+from camcomp.diagnosis.model.readings import Reading, column_orders, refuse_as_read, row_shifts
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.statics.arm import arm_of, jacobian
@@ -84,23 +83,12 @@ def _readings(robot: Robot, q: Floats, tip: Floats, rows: np.ndarray) -> list[Re
     out.append(("CC407", "the joints look as if logged in degrees", joints(np.where(hinges, np.radians(q), q))))
     if not hinges.all():
         out.append(("CC407", "the joints that slide look as if logged in m", joints(np.where(hinges, q, 1e3 * q))))
-    for by in ROWS_APART:
-        way = "behind" if by < 0 else "ahead of"
-        text = f"the tips look {abs(by)} row{'s' if abs(by) > 1 else ''} {way} their joints"
-        out.append(("CC412", text, shifted(by)))
-    for i, j in combinations(range(len(names)), 2):
-        order = np.arange(len(names))
-        order[[i, j]] = order[[j, i]]
-        out.append(("CC408", f"the joints look right with {names[i]} and {names[j]} exchanged", joints(q[:, order])))
-    for j, name in enumerate(names):
-        sign = np.where(np.arange(len(names)) == j, -1.0, 1.0)
-        out.append(("CC408", f"the joints look right with {name} reversed", joints(q * sign)))
-    out.append(("CC408", "the tip looks right when two of its axes are exchanged", tips(tip[:, [1, 0, 2]])))
+    out += [("CC412", text, shifted(by)) for by, text in row_shifts("the tips look", "their joints")]
     out += [
-        ("CC408", "the joints look right in another order", joints(np.roll(q, by, axis=1)))
-        for by in range(1, len(names))
+        ("CC408", f"the joints look right {text}", joints(q[:, order] * sign))
+        for order, sign, text in column_orders(names)
     ]
-    out.append(("CC408", "the joints look right in the opposite order", joints(q[:, ::-1])))
+    out.append(("CC408", "the tip looks right when two of its axes are exchanged", tips(tip[:, [1, 0, 2]])))
     return out
 
 

@@ -1,8 +1,7 @@
 """Checks of a log against its run: program, units, axes and order of rows; contradictions are refused with the reason."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from functools import partial
-from itertools import permutations
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -11,7 +10,7 @@ from camcomp.diagnosis.experiment.logged import Logged
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
 from camcomp.diagnosis.model.noise import LEAST_VALUES
-from camcomp.diagnosis.model.readings import ROWS_APART
+from camcomp.diagnosis.model.readings import Reading, column_orders, refuse_as_read, row_shifts
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.statics.arm import ARM_LENGTH
@@ -156,10 +155,9 @@ def check_rows_together(log: Logged, *, what: str, found: Floats, due: Floats, o
             return np.inf
         return float(np.median(np.linalg.norm(apart - np.median(apart, axis=0), axis=1)))  # less the constant part
 
-    by = min((0, *(each for each in ROWS_APART if abs(each) * usual > LATEST_S)), key=off)
-    if by and off(by) < 0.5 * off(0):
-        way = "behind" if by < 0 else "ahead of"
-        raise log.refusal("CC412", f": the {what} {abs(by)} row{'s' if abs(by) > 1 else ''} {way} {other}")
+    shifts = row_shifts(f"run '{log.run}': the {what}", other)
+    late = [("CC412", text, partial(off, by)) for by, text in shifts if abs(by) * usual > LATEST_S]
+    refuse_as_read(log.file, off(0), late)
 
 
 def check_places(log: Logged, *, rho: Floats, tip: Floats, loaded: Callable[[], Floats]) -> None:
@@ -203,34 +201,20 @@ def _check(log: Logged, what: str, found: Floats, distance: Callable[[Floats], f
     """Raise CC406 to CC408 for tips or actuators found (n, k) at a distance from the expected ones."""
     names = AXES if what.startswith("tip") else log.twin.actuators
     rotary = names is not AXES and bool(log.revolute.all())
-    far, unit, off = FAR_RAD if rotary else FAR_MM, "rad" if rotary else "mm", distance(found)
+    far, size, off = FAR_RAD if rotary else FAR_MM, "rad" if rotary else "mm", distance(found)
     if off < far:
         return
-    for factor, other in (_TURNS if rotary else _LENGTH_UNITS).items():
-        if distance(found / factor) < min(far, 0.5 * off):
-            raise log.refusal("CC407", f": the {what} as if logged in {other}")
-    for order, sign in _readings(len(names)):
-        if distance(found[:, order] * sign) < min(far, 0.5 * off):
-            raise log.refusal("CC408", f": the {what} right {_told(names, order, sign)}")
-    raise log.refusal("CC406", f": {what.split()[0]} {off:.3g} {unit} from where the program goes")
-
-
-def _readings(m: int) -> Iterator[tuple[list[int], Floats]]:
-    """Orders of m columns with their signs, simple ones first; for many columns one reversal or another order at a time."""
-    same = list(range(m))
-    for j in same:
-        yield same, np.where(np.arange(m) == j, -1.0, 1.0)
-    for order in sorted(permutations(same), key=lambda each: sum(a != b for a, b in zip(each, same, strict=True))):
-        for sign in np.ndindex(*(2,) * m) if m <= 3 else ((0,) * m,):
-            yield list(order), 1.0 - 2.0 * np.array(sign)
-
-
-def _told(names: Sequence[str], order: Sequence[int], sign: Floats) -> str:
-    """Text of an order and signs of columns."""
-    moved = [names[i] for i, j in enumerate(order) if i != j]
-    turned = [names[i] for i, s in enumerate(sign) if s < 0.0]
-    out = [f"with {' and '.join(moved)} exchanged"] if len(moved) == 2 else [f"with {', '.join(moved)} in another order"] if moved else []  # fmt: skip
-    return " and ".join([*out, *([f"with {' and '.join(turned)} reversed"] if turned else [])])
+    units = _TURNS if rotary else _LENGTH_UNITS
+    readings: list[Reading] = [
+        ("CC407", f"run '{log.run}': the {what} as if logged in {unit}", partial(distance, found / factor))
+        for factor, unit in units.items()
+    ]
+    readings += [
+        ("CC408", f"run '{log.run}': the {what} right {text}", partial(distance, found[:, order] * sign))
+        for order, sign, text in column_orders(names)
+    ]
+    refuse_as_read(log.file, off, readings)
+    raise log.refusal("CC406", f": {what.split()[0]} {off:.3g} {size} from where the program goes")
 
 
 def _distance(found: Floats, *, due: Floats) -> float:
