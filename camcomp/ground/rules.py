@@ -565,7 +565,7 @@ RULES: dict[str, Rule] = {
     ),
     "CC409": Rule(
         "log too short",
-        "A run of a program has at least ten rows; fewer do not determine their noise.",
+        "A run of a program has at least twelve rows; fewer do not determine their noise.",
         "log the whole run, some hundred rows",
     ),
     "CC410": Rule(

@@ -8,6 +8,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.gap import main_channels
+from camcomp.diagnosis.fit.outliers import medians
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.result.types import Driver, StretchDriver
 from camcomp.diagnosis.statistics.cause_sets import Fitted
@@ -24,7 +25,7 @@ def with_stretches(drivers: Sequence[Driver], problem: Problem, f: Fitted) -> li
     part, bench = main_channels(problem), problem.bench
     causes = problem.causes(f.members, f.theta, f.extra)
     left = [bench.gap(k, causes)[:, part] for k in range(len(bench.runs))]
-    left = [each - np.nanmedian(each, axis=0) for each in left]  # what one run is off by stands nowhere on the travel
+    left = [each - medians(each) for each in left]  # what one run is off by stands nowhere on the travel
     where = [thinned(bench.nominal[k].motion.encoder, run.thin) for k, run in enumerate(bench.runs)]
     gap, position = np.concatenate(left), np.concatenate(where)
     channel = int(np.nanargmax(np.nansum(gap**2, axis=0)))

@@ -100,10 +100,10 @@ def _gone_along(tip: Floats, encoder: Floats, slopes: Floats, bad: Bools) -> Boo
     tip (n, 3), encoder (n, m): measured minus model, the tip's model led by the encoders; slopes (n, 3, m) of the tip by them.
     Only of several rows in a row: what rings beside a corner may be between them.
     """
-    usual = _medians(np.where(bad, np.nan, encoder))
+    usual = medians(np.where(bad, np.nan, encoder))
     move = np.einsum("nij,nj->ni", slopes, np.where(bad, encoder - usual, 0.0))
-    off = tip - _medians(tip)
-    scale = np.maximum(1.4826 * _medians(np.abs(off)), TINY)
+    off = tip - medians(tip)
+    scale = np.maximum(1.4826 * medians(np.abs(off)), TINY)
     odds = np.nansum(((off + move) ** 2 - off**2) / scale**2, axis=1)
     edges = np.flatnonzero(np.diff(bad.any(axis=1), prepend=False, append=False))
     out = np.zeros(len(tip), bool)
@@ -112,7 +112,7 @@ def _gone_along(tip: Floats, encoder: Floats, slopes: Floats, bad: Bools) -> Boo
     return out
 
 
-def _medians(values: Floats) -> Floats:
+def medians(values: Floats) -> Floats:
     """Medians (c,) of the finite values of columns (n, c); 0 for an empty column."""
     known = np.isfinite(values).any(axis=0)
     out = np.zeros(values.shape[1])
