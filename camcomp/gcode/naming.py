@@ -1,6 +1,6 @@
 """Names of codes for messages, from pygcode, which only this file imports.
 
-pygcode covers RS274/NGC. It is used for names and modal groups only, because it rounds numbers and misreads some.
+pygcode covers RS274/NGC. It is used for names only, because it rounds numbers and misreads some.
 """
 
 import warnings
@@ -26,15 +26,6 @@ def name_of(word: str) -> str:
     found = _class_of(word)
     text = (found.__doc__ or "").strip().splitlines() if found is not None else []
     return text[0].rpartition(": ")[2].strip().lower() if text else ""
-
-
-def modal_group_of(word: str) -> int | None:
-    """Modal group of a code in pygcode, in the numbering of RS274/NGC; None: not modal, or unknown.
-
-    For the test that compares camcomp's table of groups with it.
-    """
-    found = _class_of(word)
-    return getattr(found, "modal_group", None)
 
 
 def named(word: str) -> str:

@@ -7,7 +7,6 @@ order, without products of two inputs, the loaded tip then moves by slope z + be
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from statistics import NormalDist
 
 import numpy as np
 
@@ -56,6 +55,8 @@ class TipMoves:
 @lru_cache(maxsize=8)
 def _quantiles(level: float) -> tuple[Floats, Floats]:
     """Standardised quantiles of chi-square over 1 / sqrt(degrees of freedom), from 0 (normal) to 1."""
+    from statistics import NormalDist  # slow import, as that behind it
+
     from scipy.special import gammaincinv  # a quarter of a second, for configs that state deviations
 
     root = np.linspace(0.0, 1.0, 401)
@@ -119,6 +120,8 @@ def _unfavourable(before: Floats, off: Floats, moves: TipMoves, level: float) ->
     Beside it the mean square (n,) mm^2 of the scatter across. The inputs lie off their values in proportion to what they do
     along `off`.
     """
+    from statistics import NormalDist
+
     along = np.einsum("nik,ni->nk", moves.slope, off)
     size = np.sqrt((along**2).sum(axis=1))
     weight = along / np.maximum(size, 1e-300)[:, None]

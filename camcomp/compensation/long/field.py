@@ -10,7 +10,6 @@ The cubes depend on the machine, the range of forces and the origin of the progr
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from typing import Any
 
@@ -32,7 +31,7 @@ from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.records import dataclass, replace
 from camcomp.model.statics.machine import Machine
-from camcomp.model.statics.solve import FREE, TARGET, solve, threads
+from camcomp.model.statics.solve import FREE, TARGET, in_pieces, solve
 
 CELL_MM = 24.0  # mm, edge of the largest cubes
 ALLOWED = 2.5e-5  # mm, error of a tile at its test points; half of what a program's points may show at the end
@@ -237,11 +236,10 @@ class Field:
         tile = np.empty(n, np.int64)
         packed = self.packed()
 
-        def work(a: int) -> None:
-            look_up(a, min(a + SLICE, n), m, every, near, force, answer, nominal, tile, *packed)
+        def work(rows: slice) -> None:
+            look_up(rows.start, rows.stop, m, every, near, force, answer, nominal, tile, *packed)
 
-        with ThreadPoolExecutor(threads()) as pool:
-            list(pool.map(work, range(0, n, SLICE)))
+        in_pieces(work, n, SLICE)
         self.mark(tile)
         return answer, nominal, tile
 

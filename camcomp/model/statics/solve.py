@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,14 +79,16 @@ def threads() -> int:
     return max(1, int(limit)) if limit.isdigit() else cores
 
 
-def in_pieces(work: Callable[[slice], None], n: int) -> None:
-    """Run work on slices of PIECE points on all cores, with progress messages."""
-    pieces = [slice(a, min(a + PIECE, n)) for a in range(0, n, PIECE)]
+def in_pieces(work: Callable[[slice], None], n: int, most: int = PIECE) -> None:
+    """Run work on slices of at most `most` of n points on all cores, with progress messages."""
+    pieces = [slice(a, min(a + most, n)) for a in range(0, n, most)]
     workers = min(threads(), len(pieces))
     if workers < 2:
         for piece in points(pieces, len(pieces)):
             work(piece)
         return
+    from concurrent.futures import ThreadPoolExecutor  # slow import, for several threads only
+
     with ThreadPoolExecutor(workers) as pool:
         list(points(pool.map(work, pieces), len(pieces)))
 

@@ -83,29 +83,6 @@ def moves_of(
     )
 
 
-def line_moves(
-    kind: np.ndarray, start: Floats, end: Floats, feed: Floats, mode: PathMode, waits: bool = False
-) -> ToolMoves:
-    """Rapids and straight cuts (n,) in one path mode; feed (n,) mm/min; waits: the controller stops before each."""
-    n = len(kind)
-    none = np.zeros((n, 3))
-    return ToolMoves(
-        kind=kind.astype(np.int64),
-        start=start,
-        end=end,
-        centre=none,
-        axis=none,
-        angle=none[:, 0],
-        feed=feed,
-        exact=np.full(n, mode.exact),
-        waits=waits & (np.arange(n) == 0),
-        stop=np.full(n, mode.code == 611),
-        tolerance=np.full(n, mode.tolerance_mm),
-        merge=np.full(n, mode.merge_mm),
-        per_turn=np.zeros(n, np.bool_),
-    )
-
-
 def mode_columns(modes: Sequence[PathMode]) -> tuple[Bools, Bools, Floats, Floats]:
     """Columns exact, stop, tolerance (mm) and merge (mm) (n,) of ToolMoves for path modes (n,)."""
     known, which = numbered(modes)
