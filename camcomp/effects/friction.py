@@ -57,7 +57,7 @@ _MORE_ROTARY = (
     Parameter("viscous_Nmms_per_rad", "Nmms/rad", 0.0, 0.0, 1e7, 2e4, 200.0, "gears of arms: 1 to 30 % of the rated torque at rated speed", sign=1),
     Parameter("asymmetry_Nmms_per_rad", "Nmms/rad", 0.0, -1e7, 1e7, 5e3, 100.0, "viscous forward minus mean of both ways"),
     Parameter("stribeck_Nmm", "Nmm", 0.0, 0.0, 5e6, 2e4, 100.0, _BREAKAWAY, sign=1),
-    Parameter("stribeck_rad_per_s", "rad/s", 0.02, 1e-5, 10.0, 0.01, 0.0, "gears of arms: 0.005 to 0.2 rad/s", scan=(0.005, 0.02, 0.1)),
+    Parameter("stribeck_rad_per_s", "rad/s", 0.02, 0.005, 10.0, 0.01, 0.0, "gears of arms: 0.005 to 0.2 rad/s", scan=(0.005, 0.02, 0.1)),
 )  # fmt: skip
 COULOMB = ("force_N", "force_Nmm")
 PARAMETERS = (FITTED[0], *_MORE, *FITTED[1:], *ROTARY[:2], *_MORE_ROTARY)

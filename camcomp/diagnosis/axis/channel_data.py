@@ -16,6 +16,7 @@ from camcomp.ground.datatypes import Bools, Floats
 
 LEAST = 1e-3  # of the largest column: below it bodies do not show
 HEALTHY_SHARE = 0.3  # of the channel's size: scale of a size that every axis has
+FORM = 0.2  # of the force by which friction is smaller while it turns round: laws of that are no better than this
 CLOCK, TURNING = "clock", "turning"  # kinds: rows that are late; friction while it turns round, limited by its peak
 BODIES = "bodies"  # kind: masses, first moments and inertias of the links behind a hinge, as a base of their columns
 Sizes = Mapping[str, Floats]  # kind -> columns (n, q)
@@ -101,9 +102,13 @@ class ChannelData:
             out[kind] = np.full(n := own.shape[1], most / np.sqrt(max(n, 1))) if kind == BODIES else out[kind]
         return out
 
+    def form_of_turning(self, run: int, sizes: Mapping[str, Floats]) -> Floats:
+        """What friction (n,) is not known to while it turns round; sizes: healthy ones by kind."""
+        return np.asarray(FORM * (self.healthy[run][TURNING] @ sizes[TURNING]))
+
     def refined(self, left: Sequence[Floats], sizes: Mapping[str, Floats]) -> ChannelData:
         """The data with a column for rows that are later or earlier than the motion, and with the noise of rows in which inertia
-        is not known to the floor: the instant of a force within its row is not known.
+        is not known to the floor, for the instant of a force within its row is not, or friction, while it turns round.
 
         left: residuals (n,) per run. sizes: healthy sizes by kind of the same fit.
         """
@@ -112,9 +117,13 @@ class ChannelData:
         own = [y - each for y, each in zip(self.values, left, strict=True)]
         slopes = [np.gradient(each, m.time)[:, None] for each, m in zip(own, self.moves, strict=True)]
         inertia = [np.sum([own[kind] @ sizes[kind] for kind in own], axis=0) for own in self.inertia]
+        forms = [self.form_of_turning(k, sizes) for k in range(len(self.moves))]
         return replace(
             self, healthy=[{**own, CLOCK: each} for own, each in zip(self.healthy, slopes, strict=True)],
-            noise=[np.hypot(1.0, within_a_row(each) / self.floor) for each in inertia],
+            noise=[
+                np.hypot(1.0, np.hypot(within_a_row(each), form) / self.floor)
+                for each, form in zip(inertia, forms, strict=True)
+            ],
         )  # fmt: skip
 
 

@@ -34,7 +34,7 @@ from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import PRESLIDING_MM
 
 TURNS_MM = (1e-4, 0.003, 0.02, 0.1)  # ways over which the friction of a slide turns round in its following error
-TURNS_MM_PER_S = (0.3, 1.5, 5.0)  # speeds with which it may turn round instead
+TURNS_MM_PER_S = (0.3, 1.5, 5.0, 15.0)  # corners of a polygon by which it may turn round with the speed instead
 CREEP = 0.02  # of the fastest row: speed at which Coulomb friction has turned round
 
 
@@ -199,8 +199,9 @@ def _healthy(
 
 
 def _turning(m: AxisTravel) -> Floats:
-    """Friction that turns round with the speed, minus the one that does over a distance, (n, q)."""
-    return np.stack([np.tanh(m.speed / each) for each in TURNS_MM_PER_S], axis=1) - m.reversal(PRESLIDING_MM)[:, None]
+    """Friction that turns round with the speed, as a polygon over it, minus the one that does over a distance, (n, q)."""
+    polygon = np.clip(m.speed[:, None] / TURNS_MM_PER_S, -1.0, 1.0)
+    return polygon - m.reversal(PRESLIDING_MM)[:, None]
 
 
 def _covariates(found: AxisFindings, rows: ChannelData, around: AxisSurroundings) -> list[dict[str, Floats]]:
@@ -326,7 +327,9 @@ def _channel(rows: ChannelData, done: ChannelFit, sure: Sequence[Bools]) -> Axis
     left = [done.left[k] for k in order]
     if rows.channel == "force":  # beside what laws of friction and inertia are known to
         rise = shelf.load("effects", "disturbance").RISE_S
-        own = [not_known(values[k] - done.left[k] - constant) for k in order]
+        own = [
+            np.hypot(not_known(values[k] - done.left[k] - constant), rows.form_of_turning(k, done.sizes)) for k in order
+        ]
         known = [np.hypot(each, rising(pushed[k], moves[k].time, rise)) for k, each in zip(order, own, strict=True)]
         left = [each / np.hypot(1.0, by / rows.floor) for each, by in zip(left, known, strict=True)]
     if rows.noise:
