@@ -37,7 +37,7 @@ class ChannelData:
     directions, which deflects the loop. noise (n,) per run: of rows, in floors; 1 where it is not given. healthy: columns of
     the sizes that every axis has; inertia: those that are force of inertia alone. covariates (n,) of the dictionary. response:
     what causes with their amplitudes (d,) add to the channel of run k (n,). level: constant without a meaning. clock: standard
-    deviation of the instants of rows against the motion, s.
+    deviation of the instants of rows against the motion, s. scatter: of the encoders by which the axis moved, row by row.
     """
 
     channel: ChannelName
@@ -58,6 +58,7 @@ class ChannelData:
     response: Response = no_response
     level: float = 0.0
     clock: float = 0.0
+    scatter: float = 0.0
 
     @property
     def hinge(self) -> bool:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.channel_data import ChannelData, shrunk
 from camcomp.diagnosis.axis.effect_columns import AxisCause
 from camcomp.diagnosis.axis.gate import KNOWN
@@ -448,7 +449,7 @@ def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[
 def _spreads_of_shapes(
     data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, amount: Sequence[Floats], sd: float
 ) -> dict[int, dict[str, float]]:
-    """Standard deviations of logarithms of shapes by term."""
+    """Standard deviations of logarithms of shapes by term; a length is not known better than the positions of rows."""
     members = linear.found.members
     names = _scanned(terms, members)
     out: dict[int, dict[str, float]] = {}
@@ -456,5 +457,7 @@ def _spreads_of_shapes(
         _, spread = _jointly(data, terms, members, amount, sd, settings=True)
         first = sum(len(amount[i]) for i in members)
         for (i, name), own in zip(names, spread[first:].tolist(), strict=False):
-            out.setdefault(i, {})[name] = own
+            length = any(p.name == name and p.unit in ("mm", "rad") for p in terms[i].module.PARAMETERS)
+            apart = length * data.scatter / (lever_mm(data.hinge) * terms[i].shape[name])
+            out.setdefault(i, {})[name] = float(np.hypot(own, apart))
     return out

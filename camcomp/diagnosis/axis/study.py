@@ -238,7 +238,10 @@ def _study_force(found: AxisFindings, task: AxisTask, late: float | None) -> Non
     stated = found.stated_N
     floor = stated or rows_floor([runs[k].force for k in task.train])
     whole = [(r.time, r.force) for r in task.usable]
-    rows = task.rows(moves, values, channel="force", floor=floor, stated=stated is not None, whole=whole)
+    scatter = rows_floor([every[k].encoder for k in train])
+    rows = task.rows(
+        moves, values, channel="force", floor=floor, stated=stated is not None, whole=whole, scatter=scatter
+    )
     found.force = study_channel(found, rows, task.around, task.without)
 
 
