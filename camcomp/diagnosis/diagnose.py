@@ -16,7 +16,7 @@ from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.answer.stretch import with_stretches
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
-from camcomp.diagnosis.fit.gap import floor_um, gap_of, main_channels, rest_by_actuator
+from camcomp.diagnosis.fit.gap import floor_um, gap_sizes, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
 from camcomp.diagnosis.fit.open_problem import open_problem
@@ -95,7 +95,7 @@ def diagnose(
     with part_of_work(0.5, 0.95):
         found = search_causes(problem)
     best = found.sets.best
-    gap = gap_of(problem, best)
+    gap = GapSize.of(gap_sizes(problem, best), floor_um(problem))
     word = found.word
     law = answer_law(problem, best, found.unknown_in) if found.unknown_in else None
     stands = problem
@@ -107,12 +107,12 @@ def diagnose(
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
     result = within_floor(DiagnosisResult(
-        verdict=word, gap=GapSize(**gap), where=_where(problem, found, best, law),
+        verdict=word, gap=gap, where=_where(problem, found, best, law),
         causes=_causes(stands, found, best, law),
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
         shrinkage=shrinkage if unseen else None,
         next_experiment=_proposed(proposal) if proposal is not None else None, minor=minor_effects(stands, best),
-        outliers=outlying_rows(problem), floor=Floor(um=gap["noise_floor_um"], source=problem.floor.source),
+        outliers=outlying_rows(problem), floor=Floor(um=gap.noise_floor_um, source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
         standards=of_runs(twin, runs),
     ))  # fmt: skip

@@ -10,12 +10,10 @@ from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.outliers import medians
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.model.window import TRAVEL_BINS
 from camcomp.diagnosis.result.types import Driver, StretchDriver
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
-
-_BINS = 40
-_FEWEST = 3  # rows of a bin that is looked at
 
 
 def with_stretches(drivers: Sequence[Driver], problem: Problem, f: Fitted) -> list[Driver]:
@@ -59,17 +57,17 @@ def stretch(position: Floats, gap: Floats) -> tuple[float, float] | None:
     """
     known = np.isfinite(position) & np.isfinite(gap)
     p, g = position[known], gap[known]
-    if len(p) < _BINS or np.ptp(p) <= 0.0:
+    if len(p) < TRAVEL_BINS or np.ptp(p) <= 0.0:
         return None
-    edges = np.linspace(p.min(), p.max(), _BINS + 1)
-    bins = np.clip(np.digitize(p, edges) - 1, 0, _BINS - 1)
-    count = np.bincount(bins, minlength=_BINS)
-    mean = np.bincount(bins, g, _BINS) / np.maximum(count, 1)
-    seen = count >= _FEWEST
-    if seen.sum() < _BINS // 2:
+    edges = np.linspace(p.min(), p.max(), TRAVEL_BINS + 1)
+    bins = np.clip(np.digitize(p, edges) - 1, 0, TRAVEL_BINS - 1)
+    count = np.bincount(bins, minlength=TRAVEL_BINS)
+    mean = np.bincount(bins, g, TRAVEL_BINS) / np.maximum(count, 1)
+    seen = count > 0
+    if seen.sum() < TRAVEL_BINS // 2:
         return None
     off = np.where(seen, np.abs(mean - np.median(mean[seen])), 0.0)
     high = np.flatnonzero(off > 0.5 * off.max())
-    if not len(high) or high[-1] - high[0] + 1 > 0.5 * _BINS or (np.diff(high) > 2).any():
+    if not len(high) or high[-1] - high[0] + 1 > 0.5 * TRAVEL_BINS or (np.diff(high) > 2).any():
         return None
     return float(edges[high[0]]), float(edges[high[-1] + 1])

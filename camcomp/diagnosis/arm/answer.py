@@ -12,7 +12,6 @@ from camcomp.diagnosis.answer.minor import MOST_LISTED
 from camcomp.diagnosis.arm.case import PoseCase
 from camcomp.diagnosis.arm.curves import curve_cause
 from camcomp.diagnosis.arm.linear import covariate_of
-from camcomp.diagnosis.arm.noise_floor import TipFloor
 from camcomp.diagnosis.arm.poses import CURVE
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
@@ -26,7 +25,6 @@ from camcomp.diagnosis.result.types import (
     Driver,
     Estimate,
     FoundCause,
-    GapSize,
     IntervalShare,
     MinorEffect,
     NamedCause,
@@ -37,18 +35,6 @@ from camcomp.diagnosis.result.types import (
 from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
 from camcomp.ground.datatypes import Floats
-
-
-def gap(gaps: Sequence[Floats], floor: TipFloor | None) -> GapSize:
-    """Size of gaps (n, 3) mm."""
-    size = 1e3 * np.linalg.norm(np.concatenate(list(gaps)), axis=1)
-    return GapSize(
-        rms_um=_round(np.sqrt(np.mean(size**2))),
-        p95_um=_round(np.quantile(size, 0.95)),
-        max_um=_round(size.max()),
-        noise_floor_um=None if floor is None else _round(floor.um),
-    )
-
 
 # -- causes -----------------------------------------------------------------------------------------------------------
 

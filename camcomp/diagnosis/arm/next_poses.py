@@ -12,15 +12,14 @@ import numpy as np
 from camcomp.diagnosis.arm.case import PoseCase
 from camcomp.diagnosis.arm.poses import ArmBench, Column, Poses
 from camcomp.diagnosis.model.design import bits, designed
+from camcomp.diagnosis.model.evidence import FREE
 from camcomp.diagnosis.result.types import UNKNOWN, NextExperiment, PosesToMeasure
+from camcomp.diagnosis.statistics.probability import SEED
 from camcomp.ground.datatypes import Floats
-from camcomp.model.statics.arm import ARM_LENGTH
 
 POSES = 40  # of a proposal: an hour with a tracker
 REPEATS = 20  # poses to be visited again: a floor known to a sixth
 CANDIDATES = 400  # postures that are looked at
-FRAME = 10.0  # prior deviation of the new campaign's frame and target, in mm, and mm at the end of an arm for its turns
-POSES_SEED = 20201110  # the same answer twice
 
 
 def next_poses(case: PoseCase, word: str) -> NextExperiment | None:
@@ -76,7 +75,7 @@ def _second_campaign(case: PoseCase, poses: PosesToMeasure | None, gain: float) 
 def _repeats(campaign: Poses) -> Floats:
     """Joints (REPEATS, m) of every other quantile of the poses, in an order that does not stay in one place."""
     some = np.unique(np.linspace(0, len(campaign.q) - 1, REPEATS).astype(int))
-    return np.asarray(campaign.q[some[np.random.default_rng(POSES_SEED).permutation(len(some))]], float)
+    return np.asarray(campaign.q[some[np.random.default_rng(SEED).permutation(len(some))]], float)
 
 
 def candidates(bench: ArmBench, count: int = CANDIDATES) -> Floats:
@@ -84,7 +83,7 @@ def candidates(bench: ArmBench, count: int = CANDIDATES) -> Floats:
 
     Fewer where few of the drawn postures stand there; the seed is fixed. Collisions are not checked.
     """
-    rng = np.random.default_rng(POSES_SEED)
+    rng = np.random.default_rng(SEED)
     seen = np.concatenate([each.q for each in bench.campaigns])
     points = np.concatenate([_places(bench, each.q) for each in bench.campaigns])
     low, high = np.array([a.limits for a in bench.robot.actuators], float).T
@@ -113,7 +112,7 @@ def proposed(bench: ArmBench, columns: Sequence[Column], covariance: Floats, noi
     there = ArmBench(robot=bench.robot, causes=bench.causes, campaigns=[poses])
     group = there.groups(columns, noise)[0]
     k = len(columns)
-    whole = np.diag(np.concatenate([np.ones(k), [FRAME / ARM_LENGTH] * 3, [FRAME] * 6]) ** 2)
+    whole = np.diag(np.concatenate([np.ones(k), np.full(9, 1.0 / FREE)]))
     whole[:k, :k] = covariance + 1e-12 * np.eye(k)
     design = designed(np.concatenate([group.A, group.N], axis=2) / noise, whole, POSES)
     return q[list(design.chosen)], bits(whole[:k, :k]) - bits(design.covariance[:k, :k])

@@ -28,8 +28,8 @@ from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.explain import STATED, Explanation, KnownNoise, explain
 from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.diagnosis.result.floor_rule import within_floor
-from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
-from camcomp.diagnosis.statistics.probability import EVEN
+from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, GapSize, Outlier
+from camcomp.diagnosis.statistics.probability import EVEN, SEED
 from camcomp.diagnosis.statistics.shrinkage import SURELY
 from camcomp.ground import progress
 from camcomp.ground.datatypes import Floats
@@ -38,8 +38,6 @@ from camcomp.model.statics.description import Robot
 from camcomp.model.statics.masses import has_moved_mass
 
 MOST_POSES = 1200  # of a campaign; more are drawn from
-CAMPAIGN_SEED = 20200714  # drawing has to give the same answer twice
-PASSES = 2  # of linearising about what was found
 MANY = 4  # causes from which on a joint that was shifted for a while is looked for
 LOOSE_FRAME = 1e-3  # ratio of singular values of a frame's columns below which rows do not fix it
 
@@ -157,17 +155,16 @@ def explained(
 def relinearised(
     bench: ArmBench, shelf: Shelf, sd: float, noise: KnownNoise | None, weights: Sequence[Floats]
 ) -> Explanation:
-    """Explain at the nominal arm, then at the fitted arm (Gauss-Newton).
+    """Explain at the nominal arm, then at the fitted arm.
 
     A column that is zero at the nominal arm acts through another one, such as weight on rigid joints, and is excluded.
     """
     nominal = linearise(bench, shelf, sd, None, weights)
     found = explain(nominal, noise)
-    for _ in range(PASSES - 1):
-        at = found.amplitudes()[0]
-        if at.any():
-            model = linearise(bench, shelf, sd, at, weights).with_columns(nominal.size > 0.0)
-            found = explain(model, noise, found.background)
+    at = found.amplitudes()[0]
+    if at.any():
+        model = linearise(bench, shelf, sd, at, weights).with_columns(nominal.size > 0.0)
+        found = explain(model, noise, found.background)
     return found
 
 
@@ -249,7 +246,7 @@ def drawn(poses: Poses) -> Poses:
     """At most MOST_POSES poses, drawn evenly."""
     if len(poses.q) <= MOST_POSES:
         return poses
-    rng = np.random.default_rng(CAMPAIGN_SEED)
+    rng = np.random.default_rng(SEED)
     return poses.take(np.sort(rng.choice(len(poses.q), MOST_POSES, replace=False)))
 
 
@@ -289,9 +286,9 @@ def studied(
     ]
     known = any(c.effect != UNKNOWN for c in named)
     alternatives = answer.alternatives(case, named) if word == "ambiguous" or (word == "unknown" and known) else ()
-    floor = case.floor
+    floor, size = case.floor, 1e3 * np.linalg.norm(np.concatenate(list(case.gaps)), axis=1)
     result = DiagnosisResult(
-        verdict=word, gap=answer.gap(case.gaps, floor), where=answer.where(case, word), causes=named,
+        verdict=word, gap=GapSize.of(size, None if floor is None else floor.um), where=answer.where(case, word), causes=named,
         alternatives=alternatives if word == "ambiguous" or len(alternatives) > 1 else (),
         shrinkage=shrinkage(case, unseen, named, sorted(names), bool(holdout)), minor=minor,
         next_experiment=next_poses(case, word),

@@ -68,13 +68,7 @@ def gap(found: Sequence[AxisFindings], tip: AxisSurroundings) -> GapSize:
         )
         for a in found if a.following is not None or a.behind is not None
     }  # fmt: skip
-    return GapSize(
-        rms_um=round(1e3 * _rms(size), 3),
-        p95_um=round(1e3 * float(np.quantile(size, 0.95)), 3),
-        max_um=round(1e3 * float(size.max()), 3),
-        noise_floor_um=round(1e3 * floor, 3),
-        actuators=actuators,
-    )
+    return GapSize.of(1e3 * size, 1e3 * floor, actuators=actuators)
 
 
 def _figure(axis: AxisFindings, size: float) -> float:

@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from camcomp.diagnosis.axis.terms import AxisTravel
-from camcomp.diagnosis.model.window import best_window
+from camcomp.diagnosis.model.window import TRAVEL_BINS, best_window
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
@@ -18,7 +18,6 @@ CELL_S = 0.02  # in which a window begins and ends, before it is placed to a row
 SHORTEST_S = 0.2  # of a window
 QUARTERS = 4  # of a window, each of which has to be nearer to its shift than to none
 LEAST_SIZE = 2.0  # of the floor, that a push has to be: a force's zero wanders by less
-PLACES = 40  # of the travel, each way of its own
 FARTHEST = 3  # cells by which an end is moved to its row
 SHARP_S = 0.02  # beyond an end, at least two rows, in which most of the shift has to be gone: no place ends like that
 
@@ -107,7 +106,7 @@ def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
     low, span = float(every.min()), max(float(np.ptp(every)), 1e-9)
 
     def places(m: AxisTravel) -> Ints:
-        place = np.minimum((PLACES * (m.position - low) / span).astype(int), PLACES - 1)
+        place = np.minimum((TRAVEL_BINS * (m.position - low) / span).astype(int), TRAVEL_BINS - 1)
         return np.asarray(3 * place + np.sign(np.round(m.speed, 6)).astype(int) + 1)
 
     at = [places(m) for m in moves]

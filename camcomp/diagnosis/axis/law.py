@@ -46,7 +46,7 @@ class AxisRows(TermRows):
     ) -> None:
         self.spot, self._name, self.moves = Spot("force" if force else "control", 0), name, moves
         self.left = [each if force else -each for each in channel.left]  # set-point minus encoder is what is studied
-        self.floor, self.wide = channel.floor, float(np.sqrt(np.mean(channel.rows**2)))
+        self.floor, self._size = channel.floor, float(np.sqrt(np.mean(channel.rows**2)))
         self.noise = noise_of(np.concatenate(self.left), channel.floor)
         size = np.sqrt(np.mean(channel.columns**2, axis=0)) + 1e-300
         self._taken, self._held = np.linalg.qr(channel.columns / size)[0], held
@@ -56,6 +56,11 @@ class AxisRows(TermRows):
     def actuators(self) -> Sequence[str]:
         """The axis alone."""
         return (self._name,)
+
+    @property
+    def wide(self) -> float:
+        """Size of the channel."""
+        return self._size
 
     @property
     def row_counts(self) -> Sequence[int]:

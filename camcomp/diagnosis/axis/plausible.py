@@ -15,7 +15,6 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
 HEAVIEST_KG = 2e4  # of what one drive moves
-LARGE = 0.5  # of the travel: a gap that is no lag
 MIDDLE = (0.02, 0.98)  # quantiles between which values are looked at
 TRAVELS = 100.0  # deviations of a row that an axis which moves goes at least
 _FACTORS = {1e3: "m", 25.4: "inches", 180.0 / np.pi: "degrees where radians are due"}
@@ -31,7 +30,7 @@ def check_axes(log: str, runs: Mapping[str, AxisRun], cutting: bool = False) -> 
         if both.sum() < ROWS or not _moves(run.setpoint[both], run.encoder[both]):
             continue
         off = _spread(run.setpoint[both] - run.encoder[both])
-        if off > LARGE * _spread(run.setpoint[both]):
+        if off > 0.5 * _spread(run.setpoint[both]):
             refuse_as_read(log, off, _readings(name, runs))
         _check_size(log, name, run, cutting)
 

@@ -22,7 +22,7 @@ from camcomp.diagnosis.experiment.logged import Logged
 from camcomp.diagnosis.fit.label_offsets import STEP_S
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
-from camcomp.diagnosis.fit.starts import BEGUN_ANEW, STOOD_MM
+from camcomp.diagnosis.fit.starts import BEGUN_ANEW, STANDING_MM_PER_S, STOOD_MM
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, shelf
@@ -40,7 +40,6 @@ from camcomp.model.trajectory.segments import merged
 SAMPLE_MM = 2.0  # distance of points of the program for comparisons
 STILL_S = 0.1  # duration from which a standstill at the end of a line may be idle time
 MOST_PASSES = 8  # of the alignment with a deflected tip
-STANDING_MM_PER_S = 0.05
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -51,17 +51,6 @@ def _label_causes(problem: Problem, f: Fitted) -> list[list[Cause]]:
     return found
 
 
-def gap_of(problem: Problem, f: Fitted) -> dict[str, float]:
-    """Size of the gap over all runs, and of the floor, um; f: the causes, which labels are seen beside."""
-    size = gap_sizes(problem, f)
-    return {
-        "rms_um": round(float(np.sqrt(np.mean(size**2))), 3),
-        "p95_um": round(float(np.quantile(size, 0.95)), 3),
-        "max_um": round(float(size.max()), 3),
-        "noise_floor_um": round(floor_um(problem), 3),
-    }
-
-
 def is_at_floor(problem: Problem, f: Fitted) -> bool:
     """Whether the gap is not above the noise floor; f: the causes, which labels are seen beside."""
     return float((gap_sizes(problem, f) ** 2).mean()) <= floor_um(problem) ** 2

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run
-from camcomp.diagnosis.fit.columns import Columns
+from camcomp.diagnosis.fit.columns import CLOCK_JITTER_S, Columns
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name, scatter, scattering
 from camcomp.diagnosis.statistics.noise_model import weighted_median
 from camcomp.ground import shelf
@@ -14,7 +14,6 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 from camcomp.model.motion.twin import Twin
 
-SETTLED_S = 1e-5  # change of a clock that needs no further pass
 PASSES = 5
 STEP_S = 1e-4  # in which a tip moves in one direction
 
@@ -57,7 +56,7 @@ def _offset(twin: Twin, runs: Sequence[Run]) -> float:
             speed.append(v[use])
         change = weighted_median(np.concatenate(late), np.concatenate(speed))
         offset += change
-        if abs(change) < SETTLED_S:
+        if abs(change) < CLOCK_JITTER_S:
             break
     return offset
 

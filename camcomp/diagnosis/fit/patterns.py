@@ -10,13 +10,13 @@ from itertools import product
 
 import numpy as np
 
+from camcomp.diagnosis.fit.starts import STANDING_MM_PER_S
 from camcomp.diagnosis.model.discrepancy import ORDERS, smooth_functions
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion
 
-_MOVES = 1e-3  # of the highest speed, from which on something moves
 _RELAX_MM = (0.5, 3.0)
 KINDS = ("tip", "encoder", "drive", "dyno")
 Functions = list[list[Floats]]  # (n,) per run and function
@@ -99,7 +99,7 @@ def _of_time(grounds: Sequence[Ground]) -> dict[str, Functions]:
 def _of_direction(g: Ground) -> list[Floats]:
     """Functions (n,) of the feed direction in the plane of the workpiece."""
     speed = np.linalg.norm(g.velocity, axis=1)
-    moving = speed > _MOVES * max(float(speed.max()), 1e-9)
+    moving = speed > STANDING_MM_PER_S
     angle = np.arctan2(g.velocity[:, 1], g.velocity[:, 0])
     return [np.where(moving, f(k * angle), 0.0) for k in (1, 2) for f in (np.cos, np.sin)]
 

@@ -12,6 +12,7 @@ from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
 from camcomp.diagnosis.fit.patterns import KINDS, Dictionary
 from camcomp.diagnosis.fit.small_forces import bent_farther
+from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
@@ -24,7 +25,6 @@ from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.twin import Reading
 from camcomp.model.signal_path import stages_of
 
-BENT = 9.0  # chi-square by which the model may miss a straight line before all columns are worked out anew
 SETTLED = 0.05  # chi-square that one more pass may cost
 FARTHER = 10  # further passes for shapes that are on their way from where they were scanned
 HALVED = 6  # times that a step is halved which no machine can take
@@ -187,7 +187,7 @@ class Problem:
             if step == 0 and not shapes and bend < STRAIGHT:
                 theta = self._bounded(members, estimate(total(grams), self.prior, index)[0][index])
                 break
-            bent = bent or (step == 0 and bend > BENT)
+            bent = bent or (step == 0 and bend > INDISTINGUISHABLE)
             moved = self._columns_at(members, theta, shapes, readings, bent)
             white = [self._stacked(k, [m[k] for m in moved], index) for k in range(len(self.bench.runs))]
             left = [r + W @ theta for r, W in zip(now, white, strict=True)]
@@ -416,4 +416,4 @@ class Problem:
             for (i, p), s in zip(names, step[len(index) :], strict=True):
                 high = longest(self.bench, self.columns.candidates[i], p)
                 shapes[i][p.name] = float(np.clip(shapes[i][p.name] + s, p.low, max(high, p.low)))
-        return moves, whole < 1.0 and moves > BENT
+        return moves, whole < 1.0 and moves > INDISTINGUISHABLE

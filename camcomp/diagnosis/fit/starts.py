@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 Nuisance = tuple[str, float, list[Floats]]  # name, size, column (n, c) per run
 STOOD_MM = 5e-3  # by which what stands may move from row to row: a digit of its encoder
 UNDER_WAY = 8  # rows from the one to the other, in which its state is unknown
+STANDING_MM_PER_S = 0.05  # below which a tip has no direction of its own
 START_MM = 0.1  # by which an actuator has to move before its play is taken up: play and guides as bad as they come
 START_N = 1000.0  # how hard its guide may hold its carriage until then
 ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves

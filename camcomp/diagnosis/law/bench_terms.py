@@ -21,7 +21,6 @@ from camcomp.model.law.expression import parse
 from camcomp.model.law.spline_map import splines, tensor
 from camcomp.model.statics.description import Robot
 
-WIDE_MM = 0.2  # what a law may move the tip by, standard deviation before any data
 AT_ONCE_BYTES = 12e6  # of functions that are worked out together, before rows are thinned
 Rows = TipRows | DriveRows
 
@@ -57,12 +56,15 @@ def spots(actuators: int, kind: str) -> list[Spot]:
 class TermRows(ABC):
     """Evaluates terms on rows of runs, whatever channels show them."""
 
-    wide: float  # what a law may move these channels by, standard deviation before any data
-
     @property
     @abstractmethod
     def actuators(self) -> Sequence[str]:
         """Names in order."""
+
+    @property
+    @abstractmethod
+    def wide(self) -> float:
+        """Size of these channels: standard deviation of what a law may move them by, before any data."""
 
     @abstractmethod
     def unit(self, spot: Spot) -> str:
@@ -118,13 +120,17 @@ class TermRows(ABC):
 class TermBench(TermRows):
     """Evaluates terms on the runs of a bench; noise, inflate, times: of its rows, as a Problem has them."""
 
-    wide = WIDE_MM
-
     def __init__(self, bench: Bench, noise: Noise, inflate: Sequence[Floats], times: Sequence[Floats]) -> None:
         self.bench, self.noise, self.inflate, self.times = bench, noise, inflate, times
         self._rows: dict[tuple[str, int], list[Rows]] = {}
         self._squares: dict[Spot, list[Floats]] = {}
         self._reaches: dict[tuple[Spot, int], tuple[list[int], Floats]] = {}
+
+    @cached_property
+    def wide(self) -> float:
+        """Size of the gap of the tip, mm (rms of a coordinate)."""
+        gaps = np.concatenate([self.bench.gap(k)[:, :3].ravel() for k in range(len(self.bench.runs))])
+        return float(np.sqrt(np.nanmean(gaps**2)))
 
     @property
     def actuators(self) -> Sequence[str]:

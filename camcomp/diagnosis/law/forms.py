@@ -88,15 +88,11 @@ class Form:
 
 @dataclass(frozen=True, kw_only=True)
 class SmoothForm:
-    """A smooth map: cubic splines over one or two covariates, `counts` of each within its limits.
-
-    width: standard deviation of their coefficients before any data, mm or rad.
-    """
+    """A smooth map: cubic splines over one or two covariates, `counts` of each within its limits."""
 
     about: tuple[str, ...]
     limits: Bounds
     counts: tuple[int, ...]
-    width: float
     family: str = "map"
     shape: tuple[float, ...] = ()
 

@@ -25,18 +25,12 @@ class Shapes:
         self._seen: dict[Term, tuple[RunColumns, Floats]] = {}
 
     def columns(self, term: Term) -> tuple[RunColumns, Floats]:
-        """White columns of a term, and their prior precision (f,): WIDE_MM at the tip, or the width of a smooth map."""
+        """White columns of a term, and their prior precision (f,)."""
         if term not in self._seen:
-            self._seen[term] = self._worked_out(term)
-        return self._seen[term]
-
-    def _worked_out(self, term: Term) -> tuple[RunColumns, Floats]:
-        values = self.bench.values(term.spot, term.form)
-        if isinstance(term.form, SmoothForm):
-            precision = np.full(term.form.size, term.form.width**-2.0)
-        else:
+            values = self.bench.values(term.spot, term.form)
             precision = self.bench.precision(term.spot, values, term.form.size)[0]
-        return self.bench.white(term.spot, values), precision
+            self._seen[term] = self.bench.white(term.spot, values), precision
+        return self._seen[term]
 
     def followed(self, step: Folds, term: Term) -> Term:
         """The term with the shape that fits the data best in addition to the base."""

@@ -1,14 +1,10 @@
 """Which smooth map does a residual follow that no short law fits: cubic splines over one or two covariates.
 
-Every coefficient has a prior about zero. Its width, the covariates and the spots maximise the probability of withheld
-parts, one spot after the other. Without a gain on withheld parts the answer has no map.
+Every coefficient has the prior of a law's. The covariates and the spots maximise the probability of withheld parts, one
+spot after the other. Without a gain on withheld parts the answer has no map.
 """
 
 from __future__ import annotations
-
-from dataclasses import replace
-
-import numpy as np
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, spots
 from camcomp.diagnosis.law.find import FoundLaw, fitted
@@ -18,7 +14,6 @@ from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 
 BOTH = 6  # splines over each of two covariates; twice as many over a single one
-WIDTHS_MM = (0.01, 0.03, 0.1)  # of the coefficients at the tip, standard deviation before any data
 _SINGLE = ("heading_rad", "temp_C", "cut_min", "fx_N", "fy_N", "fz_N")
 
 
@@ -34,12 +29,11 @@ def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundLaw | None:
             size = bench.sizes(spot)
             for names in _covariates(spot, size):
                 counts = (2 * BOTH,) if len(names) == 1 else (BOTH, BOTH)
-                form = SmoothForm(about=names, limits=tuple(size.limits[n] for n in names), counts=counts, width=1.0)
-                G, h = step.together([shapes.columns(Term(spot, form))[0]])
-                for width in WIDTHS_MM:
-                    gain = withheld(gains(G, h, np.full(form.size, width**-2.0)))
-                    if best is None or gain > best[0]:
-                        best = gain, Term(spot, replace(form, width=width))
+                form = SmoothForm(about=names, limits=tuple(size.limits[n] for n in names), counts=counts)
+                white, precision = shapes.columns(Term(spot, form))
+                gain = withheld(gains(*step.together([white]), precision))
+                if best is None or gain > best[0]:
+                    best = gain, Term(spot, form)
         if best is None or best[0] < EQUAL_LOG_ODDS:
             break
         chosen.append(best[1])

@@ -22,8 +22,7 @@ from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, stated
 from camcomp.ground.datatypes import Floats
 
 ORDERS = 8  # cosines of a covariate
-SCALES = (1.0, 2.0, 5.0, 10.0, 30.0, 100.0)  # of the floor: size of a covariate's function, or of a family
-SIZES_OF_PROCESS = (0.5, 1.0, 2.0, 4.0, 8.0)  # of the floor
+SCALES = (1.0, 2.0, 5.0, 10.0, 30.0, 100.0)  # of the floor: size of a covariate's function, of a family or of a process
 LENGTHS = {"posture": (0.15, 0.3, 0.6, 1.2), "time": (0.01, 0.03, 0.1, 0.3)}
 ROWS_OF_PROCESS = 250  # of a region on which a process is fitted
 UNKNOWN = 0.2  # prior probability that something unmodelled acts
@@ -117,7 +116,7 @@ def fit_process(groups: Sequence[Group], left: Sequence[Floats], over: str) -> S
         for at, r in parts:
             size, way = eigh(SmoothProcess(1.0, length, over).correlation(at))
             spectra.append((np.maximum(size, 0.0), ((way.T @ r) ** 2).sum(axis=1), r.shape[1]))
-        for size_of in SIZES_OF_PROCESS:
+        for size_of in SCALES:
             square = sum(float((z / (1.0 + size_of**2 * e)).sum()) for e, z, _ in spectra) / values
             logs = sum(0.5 * c * float(np.log1p(size_of**2 * e).sum()) for e, _, c in spectra)
             value = -0.5 * values * log(max(square, 1e-300)) - logs

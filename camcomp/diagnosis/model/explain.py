@@ -27,10 +27,9 @@ from camcomp.diagnosis.model.discrepancy import (
     residuals,
 )
 from camcomp.diagnosis.model.evidence import Background, LinearModel, Members, Reduced
-from camcomp.diagnosis.model.search import MOST, Visited, search_sets
+from camcomp.diagnosis.model.search import MOST, ROUNDS, Visited, search_sets
 from camcomp.ground.datatypes import Floats
 
-ROUNDS = 6  # of discrepancies, one more each
 STATED = 0.08  # log deviation of a stated noise: instruments know themselves to an eighth in the square
 NOISES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0, 9.0)  # factors on the floor
 

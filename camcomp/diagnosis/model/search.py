@@ -13,6 +13,7 @@ from camcomp.diagnosis.model.evidence import LONG, Members
 from camcomp.ground.datatypes import Floats
 
 MOST = 5  # causes of a set
+ROUNDS = 6  # of searches about what was found, at most
 KEPT = 12  # sets of each size that are enlarged
 SLACK = 6.0  # log posterior by which the best set of a size may lie behind, and be enlarged
 

@@ -12,7 +12,7 @@ from camcomp.ground.datatypes import Floats, Ints
 
 LONGEST = 0.6  # of a run's rows: what lasts longer is how the run is
 LEAST_FREE = 0.02  # of a window's squares that the other columns have to leave
-AT_ONCE = 256  # begins that are looked at together
+TRAVEL_BINS = 40  # parts of a travel in which places are told apart
 
 
 def best_window(motion: Floats, left: Floats, basis: Floats, edges: Ints, shortest: int) -> tuple[float, int, int]:
@@ -28,18 +28,12 @@ def best_window(motion: Floats, left: Floats, basis: Floats, edges: Ints, shorte
     n = len(left)
     said, size = (_sums((motion * each).sum(axis=1))[edges] for each in (left, motion))
     taken = _sums(np.einsum("nc,nck->nk", motion, basis))[edges]
-    best = 0.0, 0, 0
-    for start in range(0, len(edges), AT_ONCE):
-        begin = np.arange(start, min(start + AT_ONCE, len(edges)))
-        rows = edges[None, :] - edges[begin, None]
-        whole = size[None, :] - size[begin, None]
-        free = whole - ((taken[None, :] - taken[begin, None]) ** 2).sum(axis=2)
-        good = (rows >= shortest) & (rows <= LONGEST * n) & (free > LEAST_FREE * whole)
-        gain = np.where(good, (said[None, :] - said[begin, None]) ** 2 / np.where(good, free, 1.0), 0.0)
-        i, j = np.unravel_index(int(np.argmax(gain)), gain.shape)
-        if gain[i, j] > best[0]:
-            best = float(gain[i, j]), int(edges[begin[i]]), int(edges[j])
-    return best
+    rows, whole = (each[None, :] - each[:, None] for each in (edges, size))
+    free = whole - sum((each[None, :] - each[:, None]) ** 2 for each in taken.T)
+    good = (rows >= shortest) & (rows <= LONGEST * n) & (free > LEAST_FREE * whole)
+    gain = np.where(good, (said[None, :] - said[:, None]) ** 2 / np.where(good, free, 1.0), 0.0)
+    i, j = np.unravel_index(int(np.argmax(gain)), gain.shape)
+    return (float(gain[i, j]), int(edges[i]), int(edges[j])) if gain[i, j] > 0.0 else (0.0, 0, 0)
 
 
 def _sums(values: Floats) -> Floats:

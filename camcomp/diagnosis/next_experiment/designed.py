@@ -21,7 +21,7 @@ from camcomp.diagnosis.next_experiment.candidates import (
 )  # fmt: skip
 from camcomp.diagnosis.next_experiment.information_gain import most_narrowed, predicted_gain, program_weight
 from camcomp.diagnosis.next_experiment.predicted_logs import Question, predict_logs
-from camcomp.diagnosis.next_experiment.proposal import WORTH, Proposal, after_unknown
+from camcomp.diagnosis.next_experiment.proposal import LEAST_BITS, Proposal, after_unknown
 from camcomp.diagnosis.next_experiment.ready_program import can_be_run
 from camcomp.diagnosis.next_experiment.site import Site, site_of
 from camcomp.diagnosis.statistics.cause_sets import Fitted
@@ -66,26 +66,26 @@ def separated(problem: Problem, rivals: Sequence[Fitted]) -> tuple[str, ...]:
 
 
 def propose(problem: Problem, rivals: Sequence[Fitted], probability: Floats, job: Job) -> Proposal | None:
-    """The best next experiment to separate fitted sets of causes; None if no gain exceeds proposal.WORTH."""
+    """The best next experiment to separate fitted sets of causes; None if all tell less than it costs to set one up."""
     if not any(f.members for f in rivals):
         return None
     desk = Desk(Question(problem, rivals, probability, job))
-    if len(rivals) == 1 and most_narrowed(desk.question, desk.weight) <= WORTH:
+    if len(rivals) == 1 and most_narrowed(desk.question, desk.weight) <= LEAST_BITS:
         return None
     found = ranked(desk, (*coarse(desk.site), *by_other_means(desk.site)))
     bench = problem.bench
     can = (each for each in found if can_be_run(each.candidate, bench.runs, job, bench.twin))
     whole = [desk.judged(each.candidate, whole=True) for each in islice(can, MOST_JUDGED_WHOLE)]
-    worth = [each for each in whole if each is not None and each.gain > WORTH]
+    worth = [each for each in whole if each is not None and each.tells]
     return max(worth, key=lambda each: each.value, default=None)
 
 
 def ranked(desk: Desk, tried: Iterable[Candidate]) -> list[Proposal]:
-    """Candidates with a gain above proposal.WORTH, best first."""
+    """Candidates that tell more than it costs to set one up, best first."""
     names = separated(desk.question.problem, desk.question.rivals)
     useful = (each for each in tried if all(effect in names for effect, *_ in each.knows))
     judged = (desk.judged(each) for each in useful if desk.site.holds(each.design.points()))
-    found = [each for each in judged if each is not None and each.gain > WORTH]
+    found = [each for each in judged if each is not None and each.tells]
     return sorted(found, key=lambda each: -each.value)
 
 
@@ -105,10 +105,9 @@ def explore(problem: Problem, labels: Sequence[tuple[str, float]], job: Job) -> 
     for each in single_changes(site):
         p = sum(weight.get(family, 0.0) for family in each.varies) / whole if whole > 0 else 0.0
         gain = -float(sum(q * np.log2(q) for q in (p, 1.0 - p) if q > 0.0))
-        if gain > WORTH:
-            others = [family for family in sorted(weight, key=lambda of: -weight[of]) if family not in each.varies]
-            outcomes = after_unknown([v for v in each.varies if v in weight] or each.varies, others)
-            found.append(Proposal(candidate=each, gain=gain, separates=("unknown",), outcomes=outcomes))
-    found.sort(key=lambda each: -each.value)
+        others = [family for family in sorted(weight, key=lambda of: -weight[of]) if family not in each.varies]
+        outcomes = after_unknown([v for v in each.varies if v in weight] or each.varies, others)
+        found.append(Proposal(candidate=each, gain=gain, separates=("unknown",), outcomes=outcomes))
+    found = sorted((each for each in found if each.tells), key=lambda each: -each.value)
     can = (each for each in found if can_be_run(each.candidate, bench.runs, job, bench.twin))
     return next((each for each in can if site.holds(each.candidate.design.points())), None)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from camcomp.diagnosis.law.words import listed
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE, MOST_SETS
 from camcomp.diagnosis.next_experiment.candidates import Candidate
+from camcomp.diagnosis.next_experiment.design import SETUP_MIN
 from camcomp.report.plot import brief
 
 if TYPE_CHECKING:
@@ -22,8 +23,8 @@ _WHAT = {
     "dyno": ("the cutting force is", 1.0, "N"),
 }
 NEITHER = "If what is left stays above the noise whichever it is, something unknown is at work as well."
-WORTH = 0.1  # bits below which an experiment is not worth proposing
 PRICE = 0.5 / 60.0  # bits per minute of machine time
+LEAST_BITS = PRICE * SETUP_MIN  # an experiment has to tell more than it costs to set one up
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -36,6 +37,11 @@ class Proposal:
     outcomes: tuple[str, ...] = ()
     told: ExpectedGain | None = None
     rivals: tuple[str, ...] = ()
+
+    @property
+    def tells(self) -> bool:
+        """Whether it tells more than it costs to set an experiment up."""
+        return self.gain > LEAST_BITS
 
     @property
     def value(self) -> float:

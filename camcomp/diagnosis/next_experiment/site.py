@@ -15,7 +15,6 @@ from camcomp.model.motion.twin import Twin
 
 STRETCH = 2.5  # largest ratio of the tip's motion per drive motion to that of the runs (nearness to singular poses)
 FARTHER = 2.0  # half widths of the work: largest distance of an experiment
-FARTHER_MM = 80.0  # the same for a small region of work
 RADII_MM = (3.0, 40.0)  # of a circle in the region of work
 _STEPS = 8  # samples of a straight line in the search for its end
 _DIFFERENCE_MM = 0.01
@@ -55,7 +54,7 @@ class Site:
     @property
     def farther(self) -> float:
         """Largest distance of an experiment from the centre of the work, mm."""
-        return float(max(FARTHER_MM, FARTHER * self.work.half.max()))
+        return FARTHER * float(max(self.work.half.max(), RADII_MM[1]))
 
     def holds(self, points: Floats) -> bool:
         """Whether points (n, 3) of an experiment are within reach of the machine and within `farther` of the work."""

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field, PrivateAttr
 
 from camcomp.diagnosis.result.standards import StandardValues
+from camcomp.ground.datatypes import Floats
 from camcomp.ground.result import Result
 
 Stage = Literal["control", "drive", "structure", "process", "tool", "workpiece", "sensor"]
@@ -47,6 +49,14 @@ class GapSize(Result):
     max_um: float
     noise_floor_um: Annotated[float | None, Field(description="null where nothing tells it")]
     actuators: dict[str, ActuatorGap] = Field(default_factory=dict)
+
+    @classmethod
+    def of(cls, size: Floats, floor: float | None, **more: Any) -> GapSize:
+        """Of distances (n,) and their noise floor, um. more: other fields."""
+        figures = np.sqrt(np.mean(size**2)), np.quantile(size, 0.95), size.max()
+        rms, p95, most = (round(float(each), 3) for each in figures)
+        noise = None if floor is None else round(floor, 3)
+        return cls(rms_um=rms, p95_um=p95, max_um=most, noise_floor_um=noise, **more)
 
 
 class LineShare(Result):

@@ -10,9 +10,10 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
 from camcomp.diagnosis.model.folds import ABOVE
+from camcomp.diagnosis.model.search import ROUNDS
 from camcomp.diagnosis.model.verdict import VerdictInputs, Word, decide
 from camcomp.diagnosis.search.credible import MODELLED, credibility
-from camcomp.diagnosis.search.fitted_sets import ROUNDS, FittedSets
+from camcomp.diagnosis.search.fitted_sets import FittedSets
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
 from camcomp.diagnosis.statistics.cause_sets import (

@@ -28,7 +28,6 @@ from camcomp.ground import progress
 from camcomp.ground.datatypes import Floats
 
 TRIED = 5  # sets fitted about a fit that are larger than it, as many of those that are not, and of single causes
-ROUNDS = 6  # fits about which sets are searched
 HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
 
 

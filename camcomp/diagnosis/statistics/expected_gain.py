@@ -6,16 +6,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from camcomp.diagnosis.statistics.probability import TEMPERATURE
+from camcomp.diagnosis.statistics.probability import SEED, TEMPERATURE
 from camcomp.ground.datatypes import Floats
 
 _OUTCOME_DRAWS = 64
-_SEED = 20120624
 
 
 def expected_gain(apart: Floats, probability: Floats) -> float:
     """Expected fall of the entropy, bits. apart (r, r): chi-square by which rival j misses the mean log of rival i."""
-    rng = np.random.default_rng(_SEED)
+    rng = np.random.default_rng(SEED)
     after = 0.0
     for i, p in enumerate(probability):
         scatter = np.sqrt(apart[i]) * rng.standard_normal((_OUTCOME_DRAWS, len(probability)))

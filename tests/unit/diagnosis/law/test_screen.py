@@ -39,6 +39,8 @@ class Rows(dict):
 class Runs(TermBench):
     """Two runs over x; rows of the first spot come before those of the second."""
 
+    wide = 0.2
+
     def __init__(self):
         super().__init__(SimpleNamespace(), None, [], [])
         t = np.linspace(0.0, 9.0, Rows.rows)
