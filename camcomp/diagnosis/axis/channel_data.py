@@ -16,7 +16,7 @@ from camcomp.ground.datatypes import Bools, Floats
 
 LEAST = 1e-3  # of the largest column: below it bodies do not show
 HEALTHY_SHARE = 0.3  # of the channel's size: scale of a size that every axis has
-FORM = 0.2  # of the force by which friction is smaller while it turns round: laws of that are no better than this
+FORM = 0.2  # of the torque by which friction of a hinge is smaller while it turns round: laws of that are no better than this
 CLOCK, TURNING = "clock", "turning"  # kinds: rows that are late; friction while it turns round, limited by its peak
 BODIES = "bodies"  # kind: masses, first moments and inertias of the links behind a hinge, as a base of their columns
 Sizes = Mapping[str, Floats]  # kind -> columns (n, q)
@@ -104,8 +104,8 @@ class ChannelData:
         return out
 
     def form_of_turning(self, run: int, sizes: Mapping[str, Floats]) -> Floats:
-        """What friction (n,) is not known to while it turns round; sizes: healthy ones by kind."""
-        return np.asarray(FORM * (self.healthy[run][TURNING] @ sizes[TURNING]))
+        """What friction (n,) of a hinge is not known to while it turns round; sizes: healthy ones by kind."""
+        return np.asarray(FORM * self.hinge * (self.healthy[run][TURNING] @ sizes[TURNING]))
 
     def refined(self, left: Sequence[Floats], sizes: Mapping[str, Floats]) -> ChannelData:
         """The data with a column for rows that are later or earlier than the motion, and with the noise of rows in which inertia

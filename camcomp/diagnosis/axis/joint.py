@@ -34,7 +34,8 @@ from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import PRESLIDING_MM
 
 TURNS_MM = (1e-4, 0.003, 0.02, 0.1)  # ways over which the friction of a slide turns round in its following error
-TURNS_MM_PER_S = (0.3, 1.5, 5.0, 15.0)  # corners of a polygon by which it may turn round with the speed instead
+TURNS_MM_PER_S = (0.3, 1.5, 5.0)  # speeds with which it may turn round instead
+CORNERS_MM_PER_S = (0.3, 1.5, 5.0, 15.0)  # of a polygon over the speed by which the friction of a hinge turns round
 CREEP = 0.02  # of the fastest row: speed at which Coulomb friction has turned round
 
 
@@ -186,7 +187,7 @@ def _healthy(
         if rows.asymmetric:
             own["asymmetry"] = np.abs(m.speed)[:, None]
         if force:
-            own[TURNING] = _turning(m)
+            own[TURNING] = _turning(m, hinge)
         moved = {kind: own[kind] for kind in own if kind == "acceleration"}
         if force and hinge:
             every, still = bodies[k]
@@ -198,10 +199,11 @@ def _healthy(
     return out, inertia
 
 
-def _turning(m: AxisTravel) -> Floats:
-    """Friction that turns round with the speed, as a polygon over it, minus the one that does over a distance, (n, q)."""
-    polygon = np.clip(m.speed[:, None] / TURNS_MM_PER_S, -1.0, 1.0)
-    return polygon - m.reversal(PRESLIDING_MM)[:, None]
+def _turning(m: AxisTravel, hinge: bool) -> Floats:
+    """Friction that turns round with the speed, in a hinge by any polygon, minus the one that does over a distance, (n, q)."""
+    speed = m.speed[:, None]
+    turned = np.clip(speed / CORNERS_MM_PER_S, -1.0, 1.0) if hinge else np.tanh(speed / TURNS_MM_PER_S)
+    return np.asarray(turned - m.reversal(PRESLIDING_MM)[:, None])
 
 
 def _covariates(found: AxisFindings, rows: ChannelData, around: AxisSurroundings) -> list[dict[str, Floats]]:
