@@ -170,8 +170,8 @@ LINKS = 0.5, 0.25, 8.0, 0.2, 5.0, 0.3, 0.1  # m, m, kg, m, kg, kg m2, kg m2: fir
 RUBS = np.array([[9.0, 6.0], [4.0, 2.5]])  # N m, N m s/rad of both joints
 
 
-def two_link_log(folder, name, seed, moves=1.0):
-    """Encoders, and torques by Siciliano et al., Robotics, 7.3.2, with friction that turns within 5 mrad/s.
+def two_link_log(folder, name, seed, moves=1.0, turned=lambda speed: np.tanh(speed / 0.005)):
+    """Encoders, and torques by Siciliano et al., Robotics, 7.3.2. turned: part of the friction that a speed (n,) has turned round.
 
     moves: stretches the course of both joints; at 0 they stand still.
     """
@@ -192,7 +192,7 @@ def two_link_log(folder, name, seed, moves=1.0):
     for name_, q in (("J1", q1), ("J2", q2)):
         columns[f"act_{name_}_rad"] = q + rng.normal(0, 1e-5, len(t))
     for k, (speed, torque) in enumerate(zip((v1, v2), torques, strict=True)):
-        rubs = RUBS[k, 0] * np.tanh(speed / 0.005) + RUBS[k, 1] * speed
+        rubs = RUBS[k, 0] * turned(speed) + RUBS[k, 1] * speed
         columns[f"act_J{k + 1}_Nmm"] = 1e3 * (torque + rubs + rng.normal(0, 0.3, len(t)))
     write(folder, name, columns)
 
@@ -208,6 +208,18 @@ def test_joints_that_move_together_do_not_bend_each_others_friction(tmp_path):
         for name, true in zip(("force_Nmm", "viscous_Nmms_per_rad"), 1e3 * RUBS[k], strict=True):
             low, high = friction.parameters[name].ci95
             assert low <= true <= high and high - low < 0.2 * true
+
+
+def test_friction_that_turns_round_with_the_speed_is_no_stribeck_friction(tmp_path):
+    (tmp_path / "arm.yaml").write_text(TWO_LINKS)
+    for name, seed in (("a", 1), ("b", 5)):
+        two_link_log(tmp_path, name, seed, turned=lambda speed: np.clip(speed / 0.004, -1.0, 1.0))
+    result = asked(tmp_path, ["arm.yaml"], "ab", holdout=["b"])
+    for k, joint in enumerate(("J1", "J2")):
+        (friction,) = [c for c in result.causes if c.target == joint]
+        assert not any(name.startswith("stribeck") for name in friction.parameters)
+        low, high = friction.parameters["force_Nmm"].ci95
+        assert low <= 1e3 * RUBS[k, 0] <= high
 
 
 def test_an_arm_with_stated_masses_may_stand_still_in_a_run(tmp_path):
