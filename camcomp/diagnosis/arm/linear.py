@@ -19,6 +19,8 @@ from camcomp.diagnosis.model.discrepancy import covariate_columns, smooth_functi
 from camcomp.diagnosis.model.evidence import LinearModel
 from camcomp.diagnosis.model.group import Group
 from camcomp.ground.datatypes import Floats
+from camcomp.model.statics.arm import joint_lines
+from camcomp.model.statics.hanging import Hung
 
 HARMONICS = (2, 4, 40)  # waves of the curve of a single joint, in as many ways
 FINER = 4  # shapes tried between two of the coarse ones
@@ -123,7 +125,8 @@ def with_dictionary(bench: ArmBench, groups: Sequence[Group], sd: float) -> list
 def dictionary(bench: ArmBench, sd: float) -> dict[str, list[Floats]]:
     """Covariate -> columns (n, 3, q) of every campaign, about one floor sd (mm) in size.
 
-    A covariate of a joint moves the tip along all three axes, or as one joint moves it (`covariate > joint`).
+    A covariate of a joint moves the tip along all three axes, or as one joint moves it (`covariate > joint`); the position of a
+    slide turns it as well: six error motions (ISO 230-1).
     """
     hung = [bench.standing(c, ()).hung for c in bench.campaigns]
     motion = [bench.joint_motion(c, (), bench.start[k]) for k, c in enumerate(bench.campaigns)]
@@ -137,7 +140,8 @@ def dictionary(bench: ArmBench, sd: float) -> dict[str, list[Floats]]:
             ("force", [h.drive[:, a] for h in hung]),
         ):
             if np.ptp(np.concatenate(values)) > 0.0:
-                out[f"{kind}:{drive.name}"] = _of(values, axes)
+                turned = kind == "position" and not drive.revolute
+                out[f"{kind}:{drive.name}"] = _of(values, _and_turns(bench, a, hung, axes) if turned else axes)
                 for i, joint in enumerate(bench.actuators):
                     out[f"{kind}:{drive.name}{BY}{joint}"] = _of(values, [w[:, :, i : i + 1] for w in ways])
     for i, axis in enumerate("xyz"):
@@ -160,6 +164,19 @@ def _of(values: Sequence[Floats], directions: Sequence[Floats]) -> list[Floats]:
     return [
         covariate_columns(smooth_functions(v, low, high), d) for v, d in zip(values, directions, strict=True)
     ]  # fmt: skip
+
+
+def _and_turns(bench: ArmBench, a: int, hung: Sequence[Hung], axes: Sequence[Floats]) -> list[Floats]:
+    """Directions (n, 3, 6) of every campaign: shifts along the axes, and turns about a point of joint a that move the tip as far."""
+    levers = [
+        each.point - np.array([joint_lines(bench.arm, q)[1][a] for q in campaign.q])
+        for each, campaign in zip(hung, bench.campaigns, strict=True)
+    ]
+    length = float(np.sqrt(np.mean(np.concatenate(levers) ** 2)))
+    return [
+        np.concatenate([e, np.cross(e, lever[:, :, None] / length, axis=1)], axis=2)
+        for lever, e in zip(levers, axes, strict=True)
+    ]
 
 
 def _of_time(bench: ArmBench, rotation: Sequence[Floats], axes: Sequence[Floats], sd: float) -> dict[str, list[Floats]]:

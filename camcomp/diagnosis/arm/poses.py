@@ -22,7 +22,7 @@ from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion, Parameter, applies
-from camcomp.model.statics.arm import Arm, arm_of
+from camcomp.model.statics.arm import ARM_LENGTH, Arm, arm_of
 from camcomp.model.statics.description import Actuator, Link, Robot
 from camcomp.model.statics.hanging import Hung, grown_way, hang, tool_wrench
 from camcomp.model.statics.masses import mass_loads
@@ -105,13 +105,6 @@ class Poses:
         out = np.empty(len(self.q))
         out[np.argsort(self.time, kind="stable")] = (np.arange(len(out)) + 0.5) / len(out)
         return out
-
-    @property
-    def features(self) -> Floats:
-        """Features (n, 2 m) that measure how similar two postures are: sines and cosines of hinges; slides count by
-        their share of 1 m.
-        """
-        return np.concatenate([np.sin(self.q), np.cos(self.q)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -243,6 +236,13 @@ class ArmBench:
         """The actuator called `name`."""
         return next(a for a in self.robot.actuators if a.name == name)
 
+    def features(self, campaign: Poses) -> Floats:
+        """Features (n, 2 m) that measure how similar two postures are: sine and cosine of a hinge; a slide counts by its share
+        of ARM_LENGTH.
+        """
+        hinge, q = np.array([a.revolute for a in self.robot.actuators]), campaign.q
+        return np.concatenate([np.where(hinge, np.sin(q), q / ARM_LENGTH), np.where(hinge, np.cos(q), 0.0)], axis=1)
+
     def groups(self, columns: Sequence[Column], sd: float, at: Mapping[int, float] | None = None) -> list[Group]:
         """Linearised rows of every campaign at amplitudes `at` (index of column -> amount); sd: noise, mm per coordinate."""
         amounts = dict(at or {})
@@ -262,7 +262,7 @@ class ArmBench:
             out.append(
                 Group(
                     name=f"{campaign.run[0]}", label=self.owner[k], y=left, A=X, N=N, sd=noise,
-                    position=campaign.features, order=clock,
+                    position=self.features(campaign), order=clock,
                 )
             )  # fmt: skip
         return out

@@ -121,7 +121,7 @@ def shrinkage(
         stages, order, refitted = left_out_in_turn(unseen.model, case.explanation.background)
     runs = []
     for (k, rows), each in zip(unseen.units, stages, strict=True):
-        parts = split_regions(bench.campaigns[k].features[rows], min(REGIONS, max(len(rows) // 8, 2)))
+        parts = split_regions(bench.features(bench.campaigns[k])[rows], min(REGIONS, max(len(rows) // 8, 2)))
         runs.append(JudgedRun([(r**2).sum(axis=1) for r in each], parts))
     share, rest = where_covered(case, named, unseen.units, [r.squares[-1] for r in runs])
     texts = ["frame of the instrument", "place of its target"] if refitted else []
