@@ -10,6 +10,7 @@ from difflib import get_close_matches
 from camcomp.diagnosis.recordings.numbered_joints import numbered_joints
 from camcomp.diagnosis.recordings.sampled import SampledColumns, some
 from camcomp.diagnosis.recordings.units import SI, factor_to, split_unit, unit_of
+from camcomp.ground.bounds import number_of
 from camcomp.ground.errors import ConfigError
 from camcomp.model.motion.log_columns import DYNO, LINE, TEMPERATURE, TIME, TIP, TIP_SD, LogColumns, log_columns
 
@@ -178,13 +179,16 @@ def unused_column_notes(parts: Sequence[SampledColumns], picked: Picked) -> list
 
 
 def _told(parts: Sequence[SampledColumns], log: str, theirs: str, notes: list[str]) -> list[Pick]:
-    """Columns with exactly this name, else in any case: at least one, at most one per part."""
-    every = [(i, j, name) for i, part in enumerate(parts) for j, name in enumerate(part.names)]
-    hits = [(i, j) for i, j, name in every if name == theirs] or [
-        (i, j) for i, j, name in every if name.lower() == theirs.lower() or _plain(name) == _plain(theirs)
-    ]
+    """Columns with exactly this name, else in any case, else of `NAME*FACTOR`: at least one, at most one per part."""
+    hits = _called(parts, theirs)
+    name, _, text = theirs.rpartition("*")
+    factor = number_of(text) or 0.0
+    if not hits and abs(factor) > 0.0:
+        hits = _called(parts, name)
+        if hits:
+            return [Pick(i, j, factor) for i, j in hits]
     if not hits:
-        names = {_plain(name): name for _, _, name in every}
+        names = {_plain(name): name for part in parts for name in part.names}
         close = get_close_matches(_plain(theirs), names, n=1)
         meant = f"did you mean {names[close[0]]}? " if close else ""
         hint = f"{meant}there are: {some(list(names.values()), 40)}"
@@ -197,6 +201,14 @@ def _told(parts: Sequence[SampledColumns], log: str, theirs: str, notes: list[st
             notes.append(f"{theirs} is in {unit}, and is taken as {unit_of(log)} all the same")
         out.append(Pick(i, j, factor))
     return out
+
+
+def _called(parts: Sequence[SampledColumns], theirs: str) -> list[tuple[int, int]]:
+    """Part and number of the columns with a name, else with that name in any case."""
+    every = [(i, j, name) for i, part in enumerate(parts) for j, name in enumerate(part.names)]
+    return [(i, j) for i, j, name in every if name == theirs] or [
+        (i, j) for i, j, name in every if name.lower() == theirs.lower() or _plain(name) == _plain(theirs)
+    ]
 
 
 def _usual(parts: Sequence[SampledColumns], log: str, usual: Sequence[str], taken: set[tuple[int, int]]) -> list[Pick]:

@@ -14,8 +14,9 @@ from camcomp.terminal.progress import say, working
 @click.option("-o", "--output-dir", metavar="DIR", required=True, help="Folder of the experiment; made when missing.")
 @click.option("--actuator", metavar="NAME", help="Axis to which a recording of one axis belongs; default: the first.")
 @click.option(
-    "--column", "columns", metavar="LOG=THEIRS", multiple=True,
-    help="Which column of theirs a column of the log is, by its name or, without header, its number; repeatable.",
+    "--column", "columns", metavar="LOG=THEIRS[*FACTOR]", multiple=True,
+    help="Which column of theirs a column of the log is, by its name or, without header, its number, times a factor to the "
+    "log's unit: act_x_N=X1_Current*120; repeatable.",
 )  # fmt: skip
 @click.option(
     "--columns", "names", metavar="'NAME NAME ...'", multiple=True,

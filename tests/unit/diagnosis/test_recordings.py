@@ -398,6 +398,21 @@ def test_names_that_controls_of_machine_tools_give_to_axes(read):
     assert "6 columns dropped" in got.told
 
 
+CURRENT = "x_cmd,y_cmd,z_cmd,act_x,act_y,act_z,X1_Current\n0,0,0,0,0,0,1.5\n1,1,0,0,1,0,2\n2,2,0,0,2,0,-3\n"
+
+
+def test_a_column_takes_a_factor_to_the_unit_of_the_log(read):
+    got = read(CURRENT, "--column", "act_x_N=x1_current*-120", "--period-s", "0.1", config="cartesian")
+    assert list(got.logs["poses"]["act_x_N"]) == [-180.0, -240.0, 360.0] and "dropped" not in got.told
+
+
+@pytest.mark.parametrize("factor", ["12O", "nan", "0", ""])
+def test_a_factor_has_to_be_a_number(read, factor):
+    got = read(CURRENT, "--column", f"act_x_N=X1_Current*{factor}", config="cartesian")
+    assert got.code == 2 and f"CC421]: there is no column X1_Current*{factor}" in got.told
+    assert "did you mean X1_Current?" in got.told
+
+
 def test_a_run_that_was_driven_without_times_asks_for_the_step_between_its_rows(read):
     got = read("x_cmd,y_cmd,z_cmd,act_x,act_y,act_z\n0,0,0,0,0,0\n1,1,0,0,1,0\n2,2,0,0,2,0\n", config="cartesian")
     assert got.code == 0 and "speeds and lags are per row, unless --period-s says" in got.told
