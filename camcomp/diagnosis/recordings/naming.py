@@ -182,11 +182,11 @@ def _told(parts: Sequence[SampledColumns], log: str, theirs: str, notes: list[st
     """Columns with exactly this name, else in any case, else of `NAME*FACTOR`: at least one, at most one per part."""
     hits = _called(parts, theirs)
     name, _, text = theirs.rpartition("*")
-    factor = number_of(text) or 0.0
-    if not hits and abs(factor) > 0.0:
+    times = number_of(text) or 0.0
+    if not hits and abs(times) > 0.0:  # not NaN
         hits = _called(parts, name)
         if hits:
-            return [Pick(i, j, factor) for i, j in hits]
+            return [Pick(i, j, times) for i, j in hits]
     if not hits:
         names = {_plain(name): name for part in parts for name in part.names}
         close = get_close_matches(_plain(theirs), names, n=1)
