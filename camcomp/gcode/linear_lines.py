@@ -33,7 +33,6 @@ class LinearMotions(NamedTuple):
     """Motions of consecutive linear moves, n of them."""
 
     row: Ints  # (n,) line, counted from the first line of the scan
-    line: Ints  # (n, 3) index in the buffer of the line's begin, its end, and behind its end of line
     begin: Ints  # (n, 5) index of each word's letter, -1 when the word is not there
     finish: Ints  # (n, 5) index behind each word
     kind: np.ndarray  # (n,) RAPID or LINE
@@ -47,10 +46,9 @@ class LinearMotions(NamedTuple):
     def room(n: int) -> LinearMotions:
         """Arrays for n motions."""
         return LinearMotions(
-            row=np.empty(n, np.int64), line=np.empty((n, 3), np.int64), begin=np.empty((n, 5), np.int64),
-            finish=np.empty((n, 5), np.int64), kind=np.empty(n, np.int8), start=np.empty((n, 3)),
-            end=np.empty((n, 3)), feed=np.empty(n), code_stated=np.empty(n, np.bool_),
-            feed_stated=np.empty(n, np.bool_),
+            row=np.empty(n, np.int64), begin=np.empty((n, 5), np.int64), finish=np.empty((n, 5), np.int64),
+            kind=np.empty(n, np.int8), start=np.empty((n, 3)), end=np.empty((n, 3)), feed=np.empty(n),
+            code_stated=np.empty(n, np.bool_), feed_stated=np.empty(n, np.bool_),
         )  # fmt: skip
 
     def take(self, a: int, b: int) -> LinearMotions:
@@ -198,9 +196,6 @@ def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, posit
                 out.begin[n, k] = begin[k]
                 out.finish[n, k] = finish[k] if begin[k] >= 0 else -1
             out.row[n] = row
-            out.line[n, 0] = at
-            out.line[n, 1] = eol
-            out.line[n, 2] = i
             out.kind[n] = LINE if now == 1 else RAPID
             out.feed[n] = speed if speed > 0.0 else np.nan
             out.code_stated[n] = stated

@@ -104,8 +104,8 @@ def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed,
                 first, joining, commanded, feed, position, state, unit, offset, digits, half, feed_point, out, written, held, value, goes, fresh):  # fmt: skip
     """The bytes text_at..text_end of `data`, which hold n motions, with N rows in their place.
 
-    lines (n, 3), begin and finish (n, 5), kind (n,), programmed (n, 3) mm, program_feed (n,): see
-    linear_lines.LinearMotions.
+    lines (n, 3): index of the begin and the end of every line, and behind its end of line. begin and finish (n, 5),
+    kind (n,), programmed (n, 3) mm, program_feed (n,): see linear_lines.LinearMotions.
     first (n + 1,): rows of every motion. joining (N,), commanded (N, 3) mm, feed (N,) mm/min (NaN: as programmed).
     position (3,) mm and state (2,) = motion code in force (-1 unknown), feed in force (NaN unknown):
     carried on. feed_point: whole feeds have a point. Fills out (bytes), written (N, 3) mm, held (N,): feed in force

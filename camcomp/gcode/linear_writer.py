@@ -10,15 +10,13 @@ from camcomp.gcode.linear_rows import MAX_ROW_BYTES, write_rows
 from camcomp.gcode.numbers import FEED_DIGITS
 from camcomp.gcode.output import Output
 from camcomp.gcode.path_mode import numbered
-from camcomp.gcode.program import LETTERS, LINEAR_LETTERS, Program
+from camcomp.gcode.program import LINEAR, Program
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 from camcomp.ground.records import dataclass
 from camcomp.ground.vectors import distinct
 
 TIE = 1e-6  # of the last digit: nearer to a tie than this, two ways of rounding may differ
 _TENS = 10.0 ** np.arange(18)
-_LINEAR = [LETTERS.index(each) for each in LINEAR_LETTERS]
-_OTHER = [k for k in range(len(LETTERS)) if k not in _LINEAR]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -73,7 +71,10 @@ class LinearWriter:
         linear &= (
             (sites.feed_mode == 94) & (sites.feed_unit == sites.unit) & ~((path.kind == LINE) & np.isnan(path.feed))
         )
-        linear &= (sites.begin[:, _OTHER] < 0).all(axis=1) & (sites.begin[:, :3] >= 0).any(axis=1)
+        for begin in sites.begin[:, LINEAR:].T:
+            linear &= begin < 0
+        x, y, z = sites.begin[:, :3].T
+        linear &= (x >= 0) | (y >= 0) | (z >= 0)
         linear[1:] &= sites.row[1:] > sites.row[:-1]
         linear &= (text.ends < text.nexts)[sites.row]
         if "/" in text.string:
@@ -92,16 +93,15 @@ class LinearWriter:
     def _is_tied(self) -> Bools:
         """Rows (N,) with a number that lies half-way between two that can be written."""
         sites, motion = self.program.sites, self.out.motion
-        scaled = np.empty(self.out.end.shape)
-        for unit in distinct(sites.unit):
-            at = sites.unit[motion] == unit
-            digits = self.program.language.digits(self.resolution, unit)
-            scaled[at] = (self.out.end[at] - sites.offset[motion[at]]) / unit * 10.0**digits
+        unit, power = sites.unit[motion], np.empty(len(motion))
+        for each in distinct(sites.unit):
+            power[unit == each] = 10.0 ** self.program.language.digits(self.resolution, each)
+        scaled = [(self.out.end[:, k] - sites.offset[motion, k]) / unit * power for k in range(3)]
         feed = np.where(np.isnan(self.out.feed), self.program.path.feed[motion], self.out.feed)
         feed = np.where(feed > 0.0, feed / sites.unit[motion], 1.0)
         feed *= _TENS[np.maximum(FEED_DIGITS - 1 - np.floor(np.log10(feed)), 0.0).astype(np.int64)]
         tied = np.zeros(len(feed), np.bool_)
-        for each in (*scaled.T, feed):
+        for each in (*scaled, feed):
             tied |= np.abs(each - np.floor(each) - 0.5) < TIE
         return tied
 
@@ -127,7 +127,7 @@ class LinearWriter:
         place = np.array(position, float)
         state = np.array([-1.0 if code is None else float(code), np.nan if feed is None else feed])
         size = write_rows(
-            self._data, begin, end, lines, sites.begin[a:b][:, _LINEAR].copy(), sites.finish[a:b][:, _LINEAR].copy(),
+            self._data, begin, end, lines, sites.begin[a:b, :LINEAR].copy(), sites.finish[a:b, :LINEAR].copy(),
             path.kind[a:b].copy(), np.ascontiguousarray(path.end[a:b]), sites.code_stated[a:b].copy(), sites.feed_stated[a:b].copy(),
             sites.modal_feed[a:b].copy(), self.bounds[a : b + 1] - self.bounds[a], self.out.joining[own].copy(),
             self.out.end[own].copy(), self.out.feed[own].copy(), place, state, unit, sites.offset[a].copy(),

@@ -7,12 +7,12 @@ from camcomp.gcode.arcs import PLANES, sweep
 from camcomp.gcode.edits import Edits
 from camcomp.gcode.numbers import plain, significant
 from camcomp.gcode.output import FEED_SLACK
-from camcomp.gcode.program import A, B, C, F, G, P, Program, R
+from camcomp.gcode.program import A, B, C, F, G, I, J, K, P, Program, R, X, Y, Z
 from camcomp.ground import orientation
 from camcomp.ground.datatypes import ARC, RAPID
 
 TURNS = (A, B, C)
-SHAPE_WORDS = (0, 1, 2, 3, 4, 5, R, P, *TURNS)  # words that define the geometry of a motion
+SHAPE_WORDS = (X, Y, Z, I, J, K, R, P, *TURNS)  # words that define the geometry of a motion
 BLANKS = " \t"
 TURN_DIGITS = {orientation.RPY: 6, orientation.VECTOR: 9}  # 0.02 urad and less
 

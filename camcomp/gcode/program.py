@@ -14,9 +14,9 @@ from camcomp.ground.records import dataclass, fields
 from camcomp.ground.vectors import distinct
 
 # Columns of Sites.begin and Sites.finish.
-X, Y, Z, I, J, K, R, F, P, A, B, C, G = range(13)
-LINEAR_LETTERS = "XYZFG"  # of linear moves, in the columns of LinearMotions.begin and finish
-LETTERS = "XYZIJKRFPABCG"  # A, B, C: words of the orientation of any notation
+X, Y, Z, F, G, I, J, K, R, P, A, B, C = range(13)
+LETTERS = "XYZFGIJKRPABC"  # A, B, C: words of the orientation of any notation
+LINEAR = 5  # columns of the words of linear moves, as in LinearMotions.begin and finish
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,7 +49,7 @@ class Sites:
 
     def take(self, rows: Ints) -> "Sites":
         """Those of some of the motions."""
-        return Sites(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
+        return Sites(**{each.name: getattr(self, each.name).take(rows, axis=0) for each in fields(self)})
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from camcomp.gcode.arcs import PLANES
 from camcomp.gcode.path_mode import PathMode
-from camcomp.gcode.program import LETTERS, LINEAR_LETTERS, Sites
+from camcomp.gcode.program import LETTERS, LINEAR, A, G, Sites
 from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import Text
 from camcomp.gcode.words import Word
@@ -167,12 +167,12 @@ class Recorder:
         state.turned = state.turns_to
         self.waits_ahead = state.waits = False
         base = int(self._starts[block.row])
-        words = block.words
-        for k, letter in enumerate((*LETTERS[:9], *orientation.LETTERS[state.orientation_form])):
-            word = None if letter in state.table or (k >= 9 and not state.setup.orients) else words.get(letter)
-            self._spans.extend((base + word.begin, base + word.end) if word else (-1, -1))
         g = block.groups.get(1)
-        self._spans.extend((base + g[1].begin, base + g[1].end) if g else (-1, -1))
+        for k, letter in enumerate((*LETTERS[:A], *orientation.LETTERS[state.orientation_form])):
+            word = block.words.get(letter) if k != G else g and g[1]
+            if letter in state.table or (k >= A and not state.setup.orients):
+                word = None
+            self._spans.extend((base + word.begin, base + word.end) if word else (-1, -1))
         self.modes.append(state.path_mode)
         self._count += 1
         if code >= 0:
@@ -194,7 +194,7 @@ class Recorder:
         numbers[:, 27:30] = numbers[:, 30:33] = state.turns_to
         numbers[0, 27:30] = state.turned
         spans = np.full((n, len(LETTERS), 2), -1, np.int64)
-        spans[:, [LETTERS.index(each) for each in LINEAR_LETTERS]] = np.stack((found.begin, found.finish), axis=2)
+        spans[:, :LINEAR] = np.stack((found.begin, found.finish), axis=2)
         self._numbers.frombytes(numbers.tobytes())
         self._spans.frombytes(spans.tobytes())
         self.modes += [state.path_mode] * n

@@ -18,7 +18,7 @@ from camcomp.gcode.flatten import flatten
 from camcomp.gcode.lineedit import BLANKS, LineEditor
 from camcomp.gcode.numbers import decimals, plain
 from camcomp.gcode.output import Output, Part, Rewritten, Standing
-from camcomp.gcode.program import P, Program, R, Rebase
+from camcomp.gcode.program import I, J, K, P, Program, R, Rebase
 from camcomp.gcode.robot_writer import rewrite_robot_program
 from camcomp.gcode.stamp import stamp_index, stamp_line
 from camcomp.gcode.text import Text
@@ -393,7 +393,7 @@ class Writer(LineEditor):
         if move.kind == ARC:
             self._centre_on_line(move, start, end)
         elif self.path.kind[k] == ARC:
-            for word in (3, 4, 5, R, P):
+            for word in (I, J, K, R, P):
                 self._remove(word)
         if move.kind != RAPID:
             self._feed_on_line(float(self.out.feed[row]), self._length(move, start, end))
@@ -442,7 +442,7 @@ class Writer(LineEditor):
                 return
             self._remove(R)
         for axis in sorted((u, v)):
-            letter = 3 + axis
+            letter = I + axis
             if was_arc and self.begin[R] < 0:
                 stays = float(self.path.centre[k, axis])
                 if not self.sites.centre_absolute[k]:

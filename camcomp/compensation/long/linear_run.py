@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.gcode.linear_lines import LinearMotions
-from camcomp.gcode.program import LETTERS, LINEAR_LETTERS, Sites
+from camcomp.gcode.program import LETTERS, LINEAR, Sites
 from camcomp.gcode.state import ControlState
 from camcomp.ground.datatypes import RAPID, Path
 from camcomp.ground.records import dataclass
@@ -51,9 +51,8 @@ class LinearRun:
         linear, n, state = self.linear, self.motions, self.state
         begin, finish = np.full((2, n, len(LETTERS)), -1)
         there = linear.begin >= 0
-        columns = [LETTERS.index(each) for each in LINEAR_LETTERS]
-        begin[:, columns] = np.where(there, linear.begin - self.text_at, -1)
-        finish[:, columns] = np.where(there, linear.finish - self.text_at, -1)
+        begin[:, :LINEAR] = np.where(there, linear.begin - self.text_at, -1)
+        finish[:, :LINEAR] = np.where(there, linear.finish - self.text_at, -1)
         none = np.zeros(n, np.bool_)
         return Sites(
             row=linear.row, begin=begin, finish=finish, unit=np.full(n, state.unit), feed_unit=np.full(n, state.feed_unit),

@@ -10,6 +10,7 @@ from camcomp.gcode.linear_rows import MAX_ROW_BYTES, put_decimal, put_feed, writ
 from camcomp.gcode.numbers import decimals, plain, significant
 from camcomp.gcode.output import Output
 from camcomp.gcode.rewrite import rewrite
+from camcomp.gcode.text import Text
 from camcomp.ground.datatypes import LINE, RAPID
 
 HEAD = "G21 G90 G94\nG0 X1 Y2 Z3 F500\n"
@@ -180,8 +181,10 @@ def test_lines_are_written_as_the_writer_of_whole_programs_writes_them(seed):
     written, held = np.empty((len(motion), 3)), np.empty(len(motion))
     first = np.searchsorted(motion - 1, np.arange(len(read.row) + 1))
     position, state = np.array([1.0, 2.0, 3.0]), np.array([0.0, 500.0])
+    text_of = Text.read(body.encode(), "p.nc")
+    lines_at = np.stack((text_of.starts, text_of.ends, text_of.nexts), axis=1)[read.row]
     size = write_rows(
-        data, 0, len(data), read.line, read.begin, read.finish, read.kind, read.end, read.code_stated, read.feed_stated,
+        data, 0, len(data), lines_at, read.begin, read.finish, read.kind, read.end, read.code_stated, read.feed_stated,
         read.feed, first, joining, end, feed, position, state, 1.0, np.zeros(3), decimals(RESOLUTION, 1.0),
         0.5 * RESOLUTION * (1 + 1e-9), False, out, written, held,
     )  # fmt: skip
