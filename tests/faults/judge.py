@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
 
+from tests.benchmarks.programs import groove
 from tests.commandline import ROOT
 from tests.faults.process import camcomp, environment
 
@@ -13,7 +14,18 @@ CODES = (0, 1, 2, 3, 4, 5)  # of the contract; 70 is a bug
 _COUNT = count(1)
 MACHINE, PROGRAM = "machine.yaml", "program.nc"
 OUTPUTS = {"-o": "out.nc", "--joints": "out.csv", "--summary": "out.json", "--paths": "paths.csv"}
-COMPENSATE = ["compensate", PROGRAM, "--config", MACHINE, *(word for pair in OUTPUTS.items() for word in pair)]
+LONG_OUTPUTS = {
+    option: name for option, name in OUTPUTS.items() if option != "--paths"
+}  # what long programs have in pieces
+LONG_MOVES = 3000
+
+
+def compensate(outputs):
+    """Words of a compensation with these outputs."""
+    return ["compensate", PROGRAM, "--config", MACHINE, *(word for pair in outputs.items() for word in pair)]
+
+
+COMPENSATE = compensate(OUTPUTS)
 
 
 @dataclass(frozen=True)
@@ -30,6 +42,7 @@ class Project:
 
     folder: Path
     more: dict[str, bytes] = field(default_factory=dict)  # further files by name
+    outputs: dict[str, str] = field(default_factory=lambda: OUTPUTS)  # of a compensation, by option
     known: dict = field(default_factory=dict)  # what was found out once
 
     def fresh(self, old=()):
@@ -49,11 +62,19 @@ class Project:
         """Outputs of an undisturbed compensation, by name."""
         if "expected" not in self.known:
             calm = self.fresh()
-            ended = camcomp(COMPENSATE, calm)
+            ended = camcomp(compensate(self.outputs), calm)
             assert ended.code == 0, f"the campaign cannot start: exit {ended.code}: {ended.said}"
-            self.known["expected"] = {name: (calm / name).read_bytes() for name in OUTPUTS.values()}
+            self.known["expected"] = {name: (calm / name).read_bytes() for name in self.outputs.values()}
             shutil.rmtree(calm)
         return self.known["expected"]
+
+    @property
+    def long(self):
+        """The same with a long program, which is corrected in pieces."""
+        if "long" not in self.known:
+            text = "\n".join(groove(LONG_MOVES)) + "\n"
+            self.known["long"] = Project(self.folder, {**self.more, PROGRAM: text.encode()}, LONG_OUTPUTS)
+        return self.known["long"]
 
     def warm_code(self, start):
         """A folder with the compiled code of a compensation; start: runs a command line in a new process."""

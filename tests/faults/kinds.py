@@ -11,7 +11,18 @@ from dataclasses import replace
 
 from tests.cluster import Cluster
 from tests.commandline import ROOT
-from tests.faults.judge import CODES, COMPENSATE, MACHINE, OUTPUTS, PROGRAM, Verdict, contents, damage, wrong
+from tests.faults.judge import (
+    CODES,
+    COMPENSATE,
+    MACHINE,
+    OUTPUTS,
+    PROGRAM,
+    Verdict,
+    compensate,
+    contents,
+    damage,
+    wrong,
+)
 from tests.faults.material import EXPERIMENT, POSES, URDF
 from tests.faults.mutate import mutated
 from tests.faults.process import Ended, Fault, Shot, camcomp, environment
@@ -21,14 +32,18 @@ LONGEST = 0.25  # s, about the time of a compensation with slow steps
 
 
 def _compensated(rng, project, fault=None, shot=None, signals=(), leftovers=False):
-    folder = project.fresh([name for name in OUTPUTS.values() if rng.random() < 0.5])
+    folder = project.fresh([name for name in project.outputs.values() if rng.random() < 0.5])
     before = contents(folder)
-    ended = camcomp(COMPENSATE, folder, fault, shot)
+    ended = camcomp(compensate(project.outputs), folder, fault, shot)
     lost = wrong(ended, signals) or damage(before, contents(folder), project.expected, leftovers=leftovers)
     if ended.code == 0 and not lost and not project.expected.items() <= contents(folder).items():
         lost = "exit 0 without all outputs"
     shutil.rmtree(folder)
     return ended, lost
+
+
+def _long(trial):
+    return lambda rng, project: trial(rng, project.long)
 
 
 def _shot(number):
@@ -47,7 +62,7 @@ def disk_full_at_a_step(rng, project):
     if (
         not lost
         and ended.code == 5
-        and not any(f"cannot write {name}: No space" in ended.said for name in OUTPUTS.values())
+        and not any(f"cannot write {name}: No space" in ended.said for name in project.outputs.values())
     ):
         lost = f"the full disk is told without its file: {ended.said}"
     return Verdict(ended.code == 5, lost)
@@ -409,6 +424,9 @@ KINDS = {
     "kill -15 while compensating": (_shot(signal.SIGTERM), 6, 8),
     "kill -2 while compensating": (_shot(signal.SIGINT), 6, 8),
     "disk full at a step of writing": (disk_full_at_a_step, 4, 6),
+    "kill -9 in a long program": (_long(_shot(signal.SIGKILL)), 3, 4),
+    "kill -15 in a long program": (_long(_shot(signal.SIGTERM)), 3, 4),
+    "disk full in a long program": (_long(disk_full_at_a_step), 3, 4),
     "limit on the size of files": (file_size_limit, 2, 3),
     "a small disk, really full": (small_disk, 2, 3),
     "read-only folder": (read_only_folder, 2, 3),

@@ -30,7 +30,7 @@ from camcomp.gcode.text import Text
 from camcomp.gcode.uncorrected import UncorrectedFeeds
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID, Path
-from camcomp.ground.errors import CheckFailed
+from camcomp.ground.errors import CheckFailed, FileError
 from camcomp.ground.progress import done
 from camcomp.ground.progress import part as part_of_work
 from camcomp.ground.records import dataclass, replace
@@ -58,7 +58,10 @@ class LongProgram:
     on_rows: Callable[[JointTableRows], None] | None = None
 
     def run(self, source: BinaryIO, sink: Callable[[bytes], object]) -> Totals:
-        """Reads the seekable source twice: once for its hash. Raises NotInPieces before or in the middle of writing."""
+        """Reads the seekable source twice: once for its hash. Raises NotInPieces before or in the middle of writing.
+
+        Raises FileError CC500 for a source that is another one when it is read again.
+        """
         digest, size, lines, rest = hashlib.sha256(), 0, 0, b""
         while block := source.read(HASHED):
             digest.update(block)
@@ -91,6 +94,8 @@ class LongProgram:
                 sink(data)
             self._told.result()
         totals, runs = self.totals, self._runs
+        if runs.digest.digest() != digest.digest():
+            raise FileError("CC500", f"cannot read {self.name}: it changed meanwhile", hint="run the command again")
         if self._stock is not None:
             self._stock.finish()
         read = [*runs.warnings, *self._feeds.warnings(), *runs.behind_end]

@@ -6,6 +6,7 @@ jump, loop or call cannot be cut into pieces; they are recognised and left to th
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterator
 from typing import BinaryIO
@@ -70,7 +71,8 @@ class Runs:
     motions: int = 0
 
     def __post_init__(self) -> None:
-        head = self.source.read(CHUNK_BYTES)
+        self.digest = hashlib.sha256()  # of the bytes read so far
+        head = self._read()
         if head[:2] in (b"\xff\xfe", b"\xfe\xff") or head[:3] == b"\xef\xbb\xbf":
             raise NotInPieces
         self._data = np.frombuffer(head, np.uint8)
@@ -124,11 +126,16 @@ class Runs:
         """Read the next chunk and append it to the unread bytes."""
         if self._last:
             return False
-        fresh = self.source.read(CHUNK_BYTES)
+        fresh = self._read()
         self._last = len(fresh) < CHUNK_BYTES
         self._data = np.frombuffer(self._data[self._at :].tobytes() + fresh, np.uint8)
         self._at = 0
         return True
+
+    def _read(self) -> bytes:
+        data = self.source.read(CHUNK_BYTES)
+        self.digest.update(data)
+        return data
 
     def _next_line(self) -> bytes | None:
         while True:

@@ -15,7 +15,7 @@ from camcomp.compensation.program.result import BOUND_UM
 from camcomp.compensation.program.totals import Totals
 from camcomp.gcode.linear_rows import csv_rows
 from camcomp.gcode.stamp import is_stamped
-from camcomp.ground.errors import CheckFailed, PhysicsError, ProgramError
+from camcomp.ground.errors import CheckFailed, FileError, PhysicsError, ProgramError
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.control import program_of, setup_of
@@ -261,6 +261,20 @@ def test_the_output_is_stamped_and_refused_a_second_time(cartesian):
     with pytest.raises(CheckFailed) as error:
         run(cartesian, once.decode())
     assert error.value.rule == "CC603"
+
+
+def test_a_program_that_changes_while_it_is_read_is_refused(cartesian):
+    class Edited(io.BytesIO):
+        def seek(self, *place):
+            at = super().seek(*place)
+            self.getbuffer()[-5:-4] = b" "  # between two readings
+            return at
+
+    text = HEAD + "\n".join(circle(30)) + "\nM30\n"
+    program = LongProgram(job=cartesian, name="p.nc", setup=setup_of(cartesian.config), tolerance_um=1.0, version="1")
+    with pytest.raises(FileError) as error:
+        program.run(Edited(text.encode()), io.BytesIO().write)
+    assert error.value.rule == "CC500" and "p.nc" in error.value.message
 
 
 def test_errors_name_the_line_of_the_whole_program(cartesian, orthoglide):
