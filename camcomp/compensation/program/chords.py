@@ -16,6 +16,7 @@ from camcomp.ground.vectors import sizes
 END_STEP = 0.85  # largest miss of an end step = that of an inner one (0.062 against 0.0625 of |x''| h^2)
 SHARE = 16.0  # inner step: miss = |x''| h^2 / SHARE
 SINGLE = 8.0  # a piece in one step: both ends in place
+COARSE_MM = 8.0  # distance of trial points on straight lines without effects
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class Nodes:
         return at, np.flatnonzero(known[at] != own)
 
 
-def trial_nodes(length: Floats, angle: Floats, divide: np.ndarray, spacing: float = 8.0) -> Nodes:
+def trial_nodes(length: Floats, angle: Floats, divide: np.ndarray, spacing: float = COARSE_MM) -> Nodes:
     """At least three nodes where `divide`, one every `spacing` mm of length (p,) and 15 degrees of arc (p,); two elsewhere."""
     along = np.ceil(length / spacing) * (length > 0.25 * spacing)
     count = np.where(divide, 3 + along + np.ceil(np.abs(angle) / 0.26), 2)

@@ -13,7 +13,7 @@ import numpy as np
 from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.arcs_out import Arcs, Bend
-from camcomp.compensation.program.chords import Nodes, second_derivative, trial_nodes
+from camcomp.compensation.program.chords import COARSE_MM, Nodes, second_derivative, trial_nodes
 from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of, times_of
 from camcomp.compensation.program.judged_points import (
     JudgedPoints,
@@ -24,6 +24,7 @@ from camcomp.compensation.program.judged_points import (
     see_original,
     whole_pose,
 )
+from camcomp.compensation.program.line_ends import pieces_between
 from camcomp.compensation.program.load_turns import load_turns
 from camcomp.compensation.program.moves import (
     WITHIN_RAPID,
@@ -67,7 +68,7 @@ from camcomp.model.statics.target import Correction
 MAX_ROUNDS, ARC_ROUNDS = 6, 4
 STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
 WITH_SHARES = 0.7  # of the tolerance at the points looked at: where the share bends, more is missed between them
-COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
+FINE_MM = 0.5  # distance of trial points on straight lines with effects
 SHARE_OF_WAVE = 0.15  # between them, at most: no row of points meets a wave at its zeros alone
 
 
@@ -196,7 +197,7 @@ class _Correction:
         if self.shares is not None:
             track, of = self.shares.divided(self.shares.with_jumps(track))
             turning = turning[of]
-        self.track, self.pushed = track, self.turns.pieces(base, track)
+        self.track, self.pushed = track, pieces_between(base, track, self.turns.spans)
         self.corrected = corrected_pieces(program.path, track)
         self.feeding = self.corrected & (program.path.kind[track.motion] != RAPID)
         if self.part is not None:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from camcomp.compensation.program.chords import trial_nodes
-from camcomp.compensation.program.moves import corrected_pieces, travel_of
+from camcomp.compensation.program.line_ends import Span, cut_at, points_along
+from camcomp.compensation.program.moves import travel_of
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.ground.records import dataclass
 from camcomp.model.cutting.track import Track
@@ -22,37 +22,27 @@ SPACING_MM = 2.0  # between the points at which loads are looked at
 
 @dataclass(frozen=True, eq=False)
 class LoadTurns:
-    """k places: piece (k,), and where in it they begin and end (k,), as fractions."""
+    """The places as spans of pieces."""
 
-    piece: Ints
-    begin: Floats
-    end: Floats
+    spans: list[Span]
 
     def passed(self, piece: Ints, move: Ints, f: Floats, w: Floats) -> Bools:
         """Which of points (n,) at fractions f of moves, seen at fractions w of pieces, lie inside moves through such places."""
         out = np.zeros(len(piece), np.bool_)
         low, high = np.full((2, int(move.max(initial=0)) + 1), np.nan)
         low[move[f == 0.0]], high[move[f == 1.0]] = w[f == 0.0], w[f == 1.0]
-        for i, middle in zip(self.piece, 0.5 * (self.begin + self.end), strict=True):
+        for i, begin, end in self.spans:
+            middle = 0.5 * (begin + end)
             out |= (piece == i) & (low[move] <= middle) & (middle <= high[move]) & (f < 1.0)
         return out
 
     def cut(self, track: Track) -> Track:
         """Their track with pieces of its own for these places."""
-        ends = [(i, at) for i, *both in zip(self.piece, self.begin, self.end, strict=True) for at in both if 0 < at < 1]
-        return track.cut(np.array([i for i, _ in ends]), np.array([at for _, at in ends])) if ends else track
-
-    def pieces(self, track: Track, divided: Track) -> Bools:
-        """Which pieces (p,) of what their track was divided into lie in such places."""
-        middle, out = 0.5 * (divided.u0 + divided.u1), np.zeros(len(divided.motion), np.bool_)
-        for i, a, b in zip(self.piece, self.begin, self.end, strict=True):
-            low, high = track.u(np.array([i, i]), np.array([a, b]))
-            out |= (divided.motion == track.motion[i]) & (low < middle) & (middle < high)
-        return out
+        return cut_at(track, [(i, at) for i, *ends in self.spans for at in ends])
 
     def warning(self) -> list[str]:
         """A line for the user where there are such places."""
-        count = len(self.piece)
+        count = len(self.spans)
         places = "1 place" if count == 1 else f"{count} places"
         text = f"at {places} the load turns round and pushes a drive through its play: not corrected, nor counted in the tip error"
         return [text] if count else []
@@ -60,12 +50,11 @@ class LoadTurns:
 
 def load_turns(job: Job, track: Track) -> LoadTurns:
     """The places in corrected feed pieces of a track where loads push carriages through their play."""
-    none = LoadTurns(np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
-    feed = corrected_pieces(track.path, track) & (track.path.kind[track.motion] != RAPID) & (track.length > 0.0)
-    if not feed.any() or not gives_way(job):
-        return none
-    trial = trial_nodes(track.length, track.angle, feed, SPACING_MM)
-    piece, w = trial.piece[feed[trial.piece]], trial.w[feed[trial.piece]]
+    if not gives_way(job):
+        return LoadTurns([])
+    piece, w = points_along(track, SPACING_MM)
+    cuts = (track.path.kind[track.motion[piece]] != RAPID) & (track.length[piece] > 0.0)
+    piece, w = piece[cuts], w[cuts]
     flank, stays = _flanks(job, track, piece, w)
     piece, w, flank = piece[stays], w[stays], flank[stays]
     at = np.flatnonzero(_other(job, flank[1:], flank[:-1]) & (np.diff(piece) == 0))
@@ -80,7 +69,7 @@ def load_turns(job: Job, track: Track) -> LoadTurns:
             behind = reached if side == 0 else ~reached
             low, high = np.where(behind, middle, low), np.where(behind, high, middle)
         ends.append(high if side else low)
-    return LoadTurns(here, *ends)
+    return LoadTurns(list(zip(here.tolist(), *(each.tolist() for each in ends), strict=True)))
 
 
 def _flanks(job: Job, track: Track, piece: Ints, w: Floats) -> tuple[Floats, Bools]:

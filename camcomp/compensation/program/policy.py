@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 from camcomp.compensation.bands.scatter import best_share, excess
-from camcomp.compensation.program.chords import trial_nodes
-from camcomp.compensation.program.moves import corrected_pieces, travel_of
+from camcomp.compensation.program.line_ends import points_along
+from camcomp.compensation.program.moves import travel_of
 from camcomp.compensation.program.uncertainty import Uncertainty, same_place
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.records import dataclass, replace
@@ -77,12 +77,9 @@ def shares_of(job: Job, track: Track) -> Shares | None:
     policy = job.config.compensation.policy
     if policy == "full" or not job.config.uncertain:
         return None
-    corrected = corrected_pieces(track.path, track)
-    if not corrected.any():
+    piece, w = points_along(track)
+    if not len(piece):
         return None
-    nodes = trial_nodes(track.length, track.angle, corrected & (track.length > 0.0))
-    on = corrected[nodes.piece]
-    piece, w = nodes.piece[on], nodes.w[on]
     target, travel = track.points(piece, w), travel_of(job, track, piece, w)
     aimed = aim_at(job, target, travel, "newton")
     tip, loaded = respond(job, target, travel)

@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from camcomp.compensation.program.chords import trial_nodes
-from camcomp.compensation.program.moves import corrected_pieces, travel_of
-from camcomp.compensation.program.taken_up import Cuts, cut_at, taken_up
+from camcomp.compensation.program.line_ends import Place, Span, cut_at, pieces_between, points_along
+from camcomp.compensation.program.moves import travel_of
+from camcomp.compensation.program.taken_up import taken_up
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import turning_points
@@ -36,12 +36,9 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
     spacing: distance of the points, mm, at which the carriages are looked at.
     """
     none = np.zeros(len(track.motion), np.bool_)
-    corrected = corrected_pieces(track.path, track)
-    if momentary(job.causes) or not corrected.any():
+    if momentary(job.causes):
         return track, none
-    trial = trial_nodes(track.length, track.angle, corrected & (track.length > 0.0), spacing)
-    on = corrected[trial.piece]
-    piece, w = trial.piece[on], trial.w[on]
+    piece, w = points_along(track, spacing)
     travel = travel_of(job, track, piece, w)
     found = without_drives(job, track.points(piece, w), travel)
     if not np.isfinite(found.rho).all():  # told later, with the line
@@ -49,8 +46,8 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
     feed = track.path.kind[track.motion] != RAPID
     memory, friction = plays(job, found, travel), winds_up(job, found, travel)
     carriage = found.rho * way_per_unit(job)
-    lines: set[tuple[int, float, float]] = set()
-    cuts: Cuts = set()
+    lines: set[Span] = set()
+    cuts: set[Place] = set()
     arm = carriage.shape[1] > WORDS
     for j in np.flatnonzero(memory):
         for k in turning_points(carriage[:, j], LEAST_MM)[0]:
@@ -63,18 +60,13 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
             if not _short(track, int(piece[k]), begin, ends[0]):
                 continue  # a line that is not divided cannot stand for it
             lines.add((int(piece[k]), begin, ends[0]))
-            cuts.update((int(piece[k]), at) for at in (begin, *ends) if 0.0 < at < 1.0)
+            cuts.update((int(piece[k]), at) for at in (begin, *ends))
     if not cuts:
         return track, none
     if arm and memory.any():
         cuts |= taken_up(job, track, cuts, np.flatnonzero(memory), spacing)
     divided = cut_at(track, cuts)
-    middle = 0.5 * (divided.u0 + divided.u1)
-    out = np.zeros(len(middle), np.bool_)
-    for i, a, b in lines:
-        u = track.u(np.array([i, i]), np.array([a, b]))
-        out |= (divided.motion == track.motion[i]) & (u[0] < middle) & (middle < u[1])
-    return divided, out
+    return divided, pieces_between(track, divided, lines)
 
 
 def _short(track: Track, piece: int, begin: float, end: float) -> bool:

@@ -9,16 +9,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from camcomp.compensation.program.chords import trial_nodes
-from camcomp.compensation.program.moves import corrected_pieces, travel_of
+from camcomp.compensation.program.line_ends import Place, cut_at, points_along
+from camcomp.compensation.program.moves import travel_of
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.cutting.track import Track
 from camcomp.model.effect import Cause
 from camcomp.model.error_table.table import ErrorTable
 from camcomp.model.job import Job
 from camcomp.model.statics.solve import inverse
-
-_LEAST = 1e-6  # of a piece: what lies nearer to its ends is an end
 
 
 def cut_at_knots(job: Job, track: Track, spacing: float) -> Track:
@@ -29,36 +27,28 @@ def cut_at_knots(job: Job, track: Track, spacing: float) -> Track:
     tables = [
         (cause, cause.values["table"]) for cause in job.causes if isinstance(cause.values.get("table"), ErrorTable)
     ]
-    corrected = corrected_pieces(track.path, track)
     instants = [knot for cause in job.causes for knot in _instants(cause)]
-    if not (tables or instants) or not corrected.any():
+    if not (tables or instants):
         return track
-    trial = trial_nodes(track.length, track.angle, corrected & (track.length > 0.0), spacing)
-    tip = job.frame.to_machine(track.points(trial.piece, trial.w))
+    piece, w = points_along(track, spacing)
+    tip = job.frame.to_machine(track.points(piece, w))
     machine = job.real_machine
     reference = tip - machine.nominal.held_rotation @ machine.nominal.tool
     actuators = inverse(machine, tip)
-    on = corrected[trial.piece]
-    within = on[:-1] & on[1:] & (trial.piece[1:] == trial.piece[:-1])
+    within = piece[1:] == piece[:-1]
     passed: list[tuple[Floats, Iterable[float]]] = []
     for cause, table in tables:
         named = np.flatnonzero(cause.which(machine.actuators))
         x = actuators[:, named[0]] if len(named) else reference[:, "XYZ".index(str(cause.target)[2])]
         passed.append((x, table.position.tolist()))
     if instants:
-        passed.append((travel_of(job, track, trial.piece, trial.w).time, instants))
-    cuts: set[tuple[int, float]] = set()
+        passed.append((travel_of(job, track, piece, w).time, instants))
+    cuts: set[Place] = set()
     for x, knots in passed:
         for knot in knots:
             row, share = _crossings(x - knot, within)
-            w = trial.w[row] + share * (trial.w[row + 1] - trial.w[row])
-            inner = (w > _LEAST) & (w < 1.0 - _LEAST)
-            cuts.update(zip(trial.piece[row][inner].tolist(), w[inner].tolist(), strict=True))
-    if not cuts:
-        return track
-    of, w = (np.array(each) for each in zip(*sorted(cuts), strict=True))
-    apart = np.append(True, (np.diff(of) > 0) | (np.diff(w) > _LEAST))
-    return track.cut(of[apart], w[apart])
+            cuts.update(zip(piece[row].tolist(), (w[row] + share * np.diff(w)[row]).tolist(), strict=True))
+    return cut_at(track, cuts)
 
 
 def _instants(cause: Cause) -> list[float]:

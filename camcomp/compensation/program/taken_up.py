@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from camcomp.compensation.program.chords import trial_nodes
+from camcomp.compensation.program.line_ends import Place, cut_at, points_along
 from camcomp.compensation.program.moves import corrected_pieces, travel_of
 from camcomp.ground.datatypes import RAPID, Floats, Ints
 from camcomp.model.cutting.track import Track
@@ -20,15 +20,8 @@ STANDS = 0.999  # share of its drive's way that a carriage stays behind, from wh
 LOOKS = 2  # each begins where the one before has found the bends
 NEAR = 1e-3  # of the way between two points, that are one
 
-Cuts = set[tuple[int, float]]  # piece, fraction of it
 
-
-def cut_at(track: Track, cuts: Cuts) -> Track:
-    """The track with pieces cut."""
-    return track.cut(np.array([i for i, _ in sorted(cuts)]), np.array([at for _, at in sorted(cuts)]))
-
-
-def taken_up(job: Job, track: Track, turns: Cuts, drives: Ints, spacing: float) -> Cuts:
+def taken_up(job: Job, track: Track, turns: set[Place], drives: Ints, spacing: float) -> set[Place]:
     """Where in feed lines one of `drives`, which turn round at `turns`, has gone through its play.
 
     spacing: distance of the points, mm, between which such a place is looked for.
@@ -37,10 +30,7 @@ def taken_up(job: Job, track: Track, turns: Cuts, drives: Ints, spacing: float) 
     ways = np.zeros(0)
     for _ in range(LOOKS):
         divided = cut_at(track, turns | _in_feed(track, ways))
-        corrected = corrected_pieces(divided.path, divided)
-        trial = trial_nodes(divided.length, divided.angle, corrected & (divided.length > 0.0), spacing)
-        on = corrected[trial.piece]
-        piece, w = trial.piece[on], trial.w[on]
+        piece, w = points_along(divided, spacing)
         travel = travel_of(job, divided, piece, w)
         aimed = aim_at(job, divided.points(piece, w), travel, "newton")
         if (aimed.status != 0).any():  # told later, with the line
@@ -57,10 +47,10 @@ def taken_up(job: Job, track: Track, turns: Cuts, drives: Ints, spacing: float) 
     return _in_feed(track, ways)
 
 
-def _in_feed(track: Track, ways: Floats) -> Cuts:
+def _in_feed(track: Track, ways: Floats) -> set[Place]:
     """The places inside corrected feed pieces, of those at `ways` (k,) mm along the path."""
     feed = corrected_pieces(track.path, track) & (track.path.kind[track.motion] != RAPID)
-    out: Cuts = set()
+    out: set[Place] = set()
     for at in ways:
         i = int(np.searchsorted(track.s0, at, side="right")) - 1
         share = (at - track.s0[i]) / max(float(track.length[i]), 1e-9)
