@@ -90,7 +90,7 @@ class Path:
         columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
         return cls(**columns)
 
-    def take(self, rows: NDArray[Any]) -> Path:
-        """The motions with indices or mask `rows`."""
+    def take(self, rows: NDArray[Any] | slice) -> Path:
+        """The motions with indices, mask or slice `rows`."""
         columns = {each.name: getattr(self, each.name)[rows] for each in fields(self) if each.name != "orientation"}
         return Path(**columns, orientation=None if self.orientation is None else self.orientation.take(rows))

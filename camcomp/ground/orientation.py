@@ -12,6 +12,8 @@ Sources: LinuxCNC, posemath, pmRpyMatConvert; Siemens, Sinumerik 840D sl Job Pla
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,7 +37,7 @@ class Orientation:
     start: Floats
     end: Floats
 
-    def take(self, rows: Ints) -> Orientation:
+    def take(self, rows: NDArray[Any] | slice) -> Orientation:
         """Orientation of some motions."""
         return Orientation(self.form, self.start[rows], self.end[rows])
 

@@ -9,7 +9,8 @@ from camcomp.ground.datatypes import Floats
 
 def distinct(values: np.ndarray) -> list[Any]:
     """The different values (n,), ascending; unlike numpy's unique without the import of masked arrays."""
-    return sorted(set(values.tolist()))
+    changed = values[1:] != values[:-1]  # most values are those before them
+    return sorted({*values[:1].tolist(), *values[1:][changed].tolist()})
 
 
 def sizes(vectors: Floats) -> Floats:
@@ -18,6 +19,22 @@ def sizes(vectors: Floats) -> Floats:
     for k in range(1, vectors.shape[1]):
         total += vectors[:, k] * vectors[:, k]
     return np.sqrt(total)
+
+
+def largest(vectors: Floats) -> Floats:
+    """Largest size (n,) of a component of vectors (n, c); for few columns faster than numpy's maximum along rows."""
+    out: Floats = np.abs(vectors[:, 0])
+    for k in range(1, vectors.shape[1]):
+        out = np.maximum(out, np.abs(vectors[:, k]))
+    return out
+
+
+def shifted(points: Floats, by: Floats) -> Floats:
+    """Points (n, c) plus a vector (c,); for few columns faster than numpy's sum."""
+    out = np.array(points, float)
+    for k in range(out.shape[-1]):
+        out[..., k] += by[k]
+    return out
 
 
 def cross_with(axis: Floats) -> Floats:

@@ -16,6 +16,7 @@ from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats, Path
 from camcomp.ground.errors import ConfigError, PhysicsError
 from camcomp.ground.records import dataclass, field, replace
+from camcomp.ground.vectors import shifted
 from camcomp.model import signal_path
 from camcomp.model.config.spec import Config
 from camcomp.model.config.taken import TakenFromProgram
@@ -37,11 +38,11 @@ class Frame:
 
     def to_machine(self, points: Floats) -> Floats:
         """Points (n, 3) mm, program to machine frame."""
-        return self.origin + points @ self.rotation.T
+        return shifted(points @ self.rotation.T, self.origin)
 
     def to_program(self, points: Floats) -> Floats:
         """Points (n, 3) mm, machine to program frame."""
-        return (points - self.origin) @ self.rotation
+        return shifted(points, -self.origin) @ self.rotation
 
     def vectors(self, vectors: Floats) -> Floats:
         """Vectors (n, 3), program to machine axes."""
@@ -221,9 +222,9 @@ def _forces(force: Callable[[Cut, Any], Floats], params: Any, config: Config, cu
     except ConfigError as error:
         error.at = error.at or config.at("process", "force")
         raise
-    bad = ~np.isfinite(found).all(axis=-1)
+    bad = ~np.isfinite(found)
     if bad.any():
-        line = cut.line[int(np.argmax(bad))]
+        line = cut.line[np.nonzero(bad)[0][0]]
         message = f"force model '{config.process.force.model}': the force in program line {line} is not finite"
         raise PhysicsError("CC306", message, at=config.at("process", "force", "model"))
     return found

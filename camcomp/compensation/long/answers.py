@@ -15,6 +15,7 @@ from camcomp.compensation.program.result import Interpolation
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.records import dataclass, fields, replace
+from camcomp.ground.vectors import largest
 from camcomp.model.job import Job
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.solve import FREE, TARGET, State, inverse, solve
@@ -83,9 +84,10 @@ class InterpolatedMachine:
             np.zeros(len(target), np.int64),
         )
         known.prepare(target, force)  # a wider range of forces makes new tiles
-        found, nominal, tile[at] = self._looked(known, target[at], force[at])
+        found, nominal, tile[at] = self._looked(known, target.take(at, axis=0), force.take(at, axis=0))
         answer[at], rest = found[:, :BASIC], found[:, BASIC:]
-        answer[between], _, tile[between] = known.look(target[between], force[between], every=False)
+        middle = target.take(between, axis=0), force.take(between, axis=0)
+        answer[between], _, tile[between] = known.look(*middle, every=False)
         if len(lost := np.flatnonzero(tile < 0)):
             self._exact += len(lost)
             aimed, free = (solve(self.machine, mode, target[lost], force=force[lost]) for mode in (TARGET, FREE))
@@ -110,7 +112,7 @@ class InterpolatedMachine:
         at = np.empty(len(target), np.int64)
         same_points(tips, loads, target, force, at)
         fresh = np.flatnonzero(at < 0)
-        answer, nominal, tile = answers[at], set_points[at], tiles[at]
+        answer, nominal, tile = answers.take(at, axis=0), set_points.take(at, axis=0), tiles[at]
         answer[fresh], nominal[fresh], tile[fresh] = known.look(target[fresh], force[fresh])
         return answer, nominal, tile
 
@@ -193,7 +195,7 @@ class Near:
         out = off.copy()
         follow(self.tiles.slope, self.tile, off, out)
         out += self.target
-        far = np.flatnonzero(np.abs(off).max(axis=1) > COARSE_MM)
+        far = np.flatnonzero(largest(off) > COARSE_MM)
         if len(far):
             out[far] = self.answers.solve(FREE, commanded[far], self.force[far], None, tips_only=True).tip
         return out
@@ -201,11 +203,12 @@ class Near:
     def state(self, commanded: Floats) -> Correction:
         """States of the machine (e,) at the ends, to first order as `tips`."""
         at = self.ends
-        told, off = commanded[at], commanded[at] - self.target[at] - self.correction[at]
+        told, target, correction = (each.take(at, axis=0) for each in (commanded, self.target, self.correction))
+        off = told - target - correction
         rho, drive = np.zeros(self.nominal.shape), self.drive
         follow(self.tiles.rates, self.tile[at], off, rho)
         rho += self.nominal + self.change
-        far = np.flatnonzero((self.tile[at] < 0) | (np.abs(off).max(axis=1) > COARSE_MM))
+        far = np.flatnonzero((self.tile[at] < 0) | (largest(off) > COARSE_MM))
         if len(far):
             found = self.answers.solve(FREE, told[far], self.force[at[far]], None)
             rho[far], drive = found.rho, drive.copy()
@@ -214,7 +217,7 @@ class Near:
 
     def programmed(self) -> Correction:
         """States (e,) at the ends when the targets are commanded, without drives and tilt."""
-        return self._as_state(self.target[self.ends], self.nominal, np.full(self.nominal.shape, np.nan))
+        return self._as_state(self.target.take(self.ends, axis=0), self.nominal, np.full(self.nominal.shape, np.nan))
 
     def _as_state(self, commanded: Floats, rho: Floats, drive: Floats) -> Correction:
         held = np.broadcast_to(self.answers.machine.nominal.held_rotation, (len(rho), 3, 3))

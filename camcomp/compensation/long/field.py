@@ -30,6 +30,7 @@ from camcomp.compensation.long.kernel import (
 from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.records import dataclass, replace
+from camcomp.ground.vectors import shifted
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.solve import FREE, TARGET, in_pieces, solve
 
@@ -210,8 +211,9 @@ class Field:
 
     def prepare(self, tips: Floats, force: Floats) -> Floats:
         """Makes the tiles for points (n, 3) and forces (n, 3) that are going to be asked for; the points as look_up wants them."""
-        tips = tips - self.corner
-        if len(force) and ((force < self.low - 1e-9).any() or (force > self.high + 1e-9).any()):
+        tips = shifted(tips, -self.corner)
+        limits = zip(force.T, self.low - 1e-9, self.high + 1e-9, strict=True)
+        if len(force) and any(each.min() < low or each.max() > high for each, low, high in limits):
             self._narrower.append((self._key, self.tiles, self._loaded))
             self._set_range(np.concatenate((force, [self.low, self.high])))
         room = np.empty(len(tips), np.int64)

@@ -97,7 +97,7 @@ class Arcs:
 
     def take(self, rows: np.ndarray) -> Arcs:
         """Some of the moves."""
-        return Arcs(self.centre[rows], self.angle[rows])
+        return Arcs(self.centre.take(rows, axis=0), self.angle[rows])
 
     def followed_by(self, n: int) -> Arcs:
         """With n straight lines behind."""
@@ -145,13 +145,15 @@ def stated_sweeps(start: Floats, end: Floats, centre: Floats, axis: Floats, angl
     return out
 
 
-def lengths(start: Floats, end: Floats, arcs: Arcs, axis: Floats) -> Floats:
-    """Lengths (k,) mm of moves that may be arcs."""
-    straight = sizes(end - start)
-    p = start - arcs.centre
-    p = p - np.sum(p * axis, axis=1, keepdims=True) * axis
-    climb = np.sum((end - start) * axis, axis=1)
-    out: Floats = np.where(arcs.on, np.hypot(sizes(p) * np.abs(arcs.angle), climb), straight)
+def lengths(start: Floats, end: Floats, arcs: Arcs, axis: Floats, motion: Ints) -> Floats:
+    """Lengths (k,) mm of moves that may be arcs; axis (n, 3) of the motions (k,) that they belong to."""
+    out = sizes(end - start)
+    on = np.flatnonzero(arcs.on)
+    if len(on):
+        p, axis = start[on] - arcs.centre[on], axis[motion[on]]
+        p = p - np.sum(p * axis, axis=1, keepdims=True) * axis
+        climb = np.sum((end - start)[on] * axis, axis=1)
+        out[on] = np.hypot(sizes(p) * np.abs(arcs.angle[on]), climb)
     return out
 
 
@@ -174,6 +176,8 @@ def along(start: Floats, end: Floats, arcs: Arcs, axis: Floats, f: Floats) -> Fl
 def middles(nodes: Nodes, use: Bools) -> tuple[Nodes, Bools]:
     """The nodes with one more in the middle of every step of the pieces in use, and which ones those are."""
     step = np.flatnonzero((np.diff(nodes.piece) == 0) & use[nodes.piece[1:]])
+    if not len(step):
+        return nodes, np.zeros(len(nodes.w), np.bool_)
     k = np.concatenate((np.arange(len(nodes.w)), step + 0.5))
     order = np.argsort(k, kind="stable")
     w = np.concatenate((nodes.w, 0.5 * (nodes.w[step] + nodes.w[step + 1])))[order]

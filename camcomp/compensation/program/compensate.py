@@ -56,7 +56,7 @@ from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.progress import part as part_of_work
 from camcomp.ground.records import dataclass, replace
-from camcomp.ground.vectors import distinct, sizes
+from camcomp.ground.vectors import largest, sizes
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle
 from camcomp.model.cutting.track import Track, lay_track
@@ -234,8 +234,8 @@ class _Correction:
 
     def _aim(self, nodes: Nodes) -> _Aimed:
         """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
-        job, track, orienting, on = self.job, self.track, self.orienting, self.corrected[nodes.piece]
-        piece, w, of = nodes.piece[on], nodes.w[on], np.arange(int(on.sum()))
+        job, track, orienting, on = self.job, self.track, self.orienting, np.flatnonzero(self.corrected[nodes.piece])
+        piece, w, of = nodes.piece[on], nodes.w[on], np.arange(len(on))
         if orienting is None:
             piece, w, of = without_shared_ends(track, piece, w)
         asked = of
@@ -259,7 +259,7 @@ class _Correction:
             status = np.where(own, status, 0)
         refuse_unsolved(self.program, track, piece, target, status)
         out = track.points(nodes.piece, nodes.w)
-        out[on] = result.commanded[asked]
+        out[on] = result.commanded.take(asked, axis=0)
         if self.shares is not None:
             out = self.shares.taken(track, nodes.piece, nodes.w, track.points(nodes.piece, nodes.w), out)
         return _Aimed(out, int(result.iterations[asked].max(initial=0)), words)
@@ -403,9 +403,9 @@ class _Correction:
         return Compensated(
             program=program, written=written, rows=rows, s=s, t=times_of(job, program, rows, s), nominal=nominal, state=state,
             force=acting_force(job, state.rho, points.travel, points.end), uncorrected=before.tip,
-            before=before.error[judged], after=after.error[judged], control=control, judged=points.row[judged],
+            before=before.error.take(judged, axis=0), after=after.error.take(judged, axis=0), control=control, judged=points.row[judged],
             iterations=self.aimed.iterations, method=self.method, without_spindle=still, warnings=warnings,
-            feeds=len(distinct(track.motion[self.feeding])), moved=not self.kept[self.feeding].all(), engaged=track.engaged,
+            feeds=int(np.count_nonzero(np.diff(track.motion[self.feeding], prepend=-1))), moved=not self.kept[self.feeding].all(), engaged=track.engaged,
             bands=self._bands(found, before, written), left=None if found.left is None else found.left[judged],
             orienting=self.orienting, tilt_after=None if after.tilt is None else after.tilt[judged],
             fraction=track.u(rows.piece, rows.w),
@@ -474,6 +474,6 @@ def _largest(track: Track, nodes: Nodes, size: Floats) -> Floats:
 
 def _kept(track: Track, nodes: Nodes, correction: Floats, half: float) -> Bools:
     """Pieces (p,) that stay as programmed, arcs as arcs: whole motions whose correction (k, 3) would be rounded away."""
-    most = _largest(track, nodes, np.abs(correction).max(axis=1))
+    most = _largest(track, nodes, largest(correction))
     out: Bools = (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
     return out

@@ -49,13 +49,13 @@ class FarOff:
 class PointsOnMoves:
     """Points (k,) on moves of the written program, and the tip errors there before the controller."""
 
-    move: Ints  # that leads to the point
+    move: Ints  # that leads to the point, ascending
     commanded: Floats  # (k, 3) mm
     error: Floats  # (k, 3) mm
     line: Ints  # of the source
     joined: Bools  # next to a joining line
 
-    def take(self, rows: np.ndarray | slice, shift: int = 0) -> PointsOnMoves:
+    def take(self, rows: slice, shift: int = 0) -> PointsOnMoves:
         """Some of them, their moves counted from `shift`."""
         parts = {each.name: getattr(self, each.name)[rows] for each in fields(self)}
         return PointsOnMoves(**{**parts, "move": parts["move"] - shift})
@@ -119,13 +119,14 @@ class ControlAccount:
         until = int(np.searchsorted(plan.group, end))
         self.seconds += float(plan.time[begin:end].sum())
         points = self._points[0] if len(self._points) == 1 else PointsOnMoves.joint(self._points)
-        chosen = points.take(np.flatnonzero((points.move >= self._planned) & (points.move < until)))
+        first, last = np.searchsorted(points.move, (self._planned, until)).tolist()
+        chosen = points.take(slice(first, last))
         self._judge(chosen, chosen.error + plan.leaves_by(chosen.move, chosen.commanded))
         keep = int(np.searchsorted(plan.group, max(end - IN_SIGHT, 0)))
         if keep < len(moves):
             self._arrives = float(plan.passes[plan.group[keep]])
             self._moves = [moves.take(slice(keep, None))]
-            self._points = [points.take(np.flatnonzero(points.move >= until), keep)]
+            self._points = [points.take(slice(last, None), keep)]
         self._waiting, self._planned = len(moves) - keep, until - keep
 
     def _judge(self, points: PointsOnMoves, error: Floats) -> None:

@@ -73,14 +73,14 @@ def corrected_rows(
     before = path.start[:1] if begins else start[:1]
     step = sizes(start - np.concatenate((before, stop[:-1])))
     layout = row_layout(path, track, step, program.step_mm(job.config.control.resolution_mm))
-    keep = (k > 0) | layout.leading[nodes.piece]
+    keep = np.flatnonzero((k > 0) | layout.leading[nodes.piece])
     extra = np.flatnonzero(layout.trailing)
     piece = np.concatenate((nodes.piece[keep], extra))
     w = np.concatenate((nodes.w[keep], np.ones(len(extra))))
     joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
     free, turned = _behind_cuts(program, job, track, extra, shares=shares, orienting=orienting)
-    end = np.concatenate((commanded[keep], free))
-    circles = circles.take(np.flatnonzero(keep)).followed_by(len(extra))
+    end = np.concatenate((commanded.take(keep, axis=0), free))
+    circles = circles.take(keep).followed_by(len(extra))
     order = np.arange(len(piece))
     if len(extra):
         order = np.lexsort((joining & (w > 0.0), w, piece))
@@ -134,7 +134,7 @@ def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
     same = np.concatenate(([False], (rows.piece[1:] == rows.piece[:-1])))
     w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
     programmed = (rows.w - w0) * track.length[rows.piece]
-    commanded = arcs_out.lengths(start, rows.end, rows.arcs, program.path.axis[rows.motion])
+    commanded = arcs_out.lengths(start, rows.end, rows.arcs, program.path.axis, rows.motion)
     scale = np.divide(commanded, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
     unscaled = rows.joining | ((rows.kind != LINE) & ~rows.arcs.on) | ~rows.corrected | (programmed < 0.01)
     return np.where(unscaled, feed, feed * np.clip(scale, 0.2, 5.0))
@@ -152,9 +152,10 @@ def times_of(job: Job, program: Program, rows: CorrectedRows, s: Floats) -> Floa
 def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Output:
     """The rows in the form of the writer. rest, apart (N,): force a stop at the end, forbid merging."""
     arc, bent = rows.kind == ARC, rows.arcs.on
-    centre = np.where(bent[:, None], rows.arcs.centre, path.centre[rows.motion])
+    centre = rows.arcs.centre.copy()
+    kept = np.flatnonzero(arc & ~bent)
+    centre[kept] = path.centre[rows.motion[kept]]
     return Output(
-        motion=rows.motion, kind=rows.kind.astype(np.int8), end=rows.end,
-        centre=np.where(arc[:, None], centre, np.nan), angle=rows.sweeps(path), feed=rows.feed, joining=rows.joining,
+        motion=rows.motion, kind=rows.kind.astype(np.int8), end=rows.end, centre=centre, angle=rows.sweeps(path), feed=rows.feed, joining=rows.joining,
         rest=rest, apart=apart, words=rows.words,
     )  # fmt: skip

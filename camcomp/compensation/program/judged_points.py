@@ -89,7 +89,8 @@ def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -
     piece = rows.piece[row]
     w = np.where(end, rows.w[row], start[row] + fraction * (rows.w - start)[row])
     travel = travel_of(job, track, piece, w)
-    force = np.where(end[:, None], job.frame.vectors(rows.force)[row], travel.force)  # joining lines know better
+    force = travel.force
+    force[end] = job.frame.vectors(rows.force)  # joining lines know better
     kept = ~end & ((rows.kind == ARC) & ~rows.arcs.on)[row]
     axis = np.broadcast_to(np.zeros(3), (len(piece), 3))
     if len(bent):
@@ -128,7 +129,7 @@ def see(
     if points.near is not None:
         commanded = job.frame.to_machine(told)
         state, tip = points.near.state(commanded), job.frame.to_program(points.near.tips(commanded))
-        return Seen(tip - points.target, points.near.status, tip[points.end], state)
+        return Seen(tip - points.target, points.near.status, tip.compress(points.end, axis=0), state)
     masses_at = points.target if job.causes else None  # masses move with the target
     tip, state = respond(job, told, points.travel, masses_at, before=points.before)
     return _seen(points, tip, state)
@@ -161,7 +162,8 @@ def see_original(job: Job, points: JudgedPoints) -> Seen:
     """The original program through the full model, at the same points."""
     if points.near is not None:
         tip = job.frame.to_program(points.near.target + points.near.unloaded)
-        return Seen(tip - points.target, points.near.status, tip[points.end], points.near.programmed())
+        ends = tip.compress(points.end, axis=0)
+        return Seen(tip - points.target, points.near.status, ends, points.near.programmed())
     tip, state = respond(job, points.target, points.travel, before=points.before, tips_only=True)
     return _seen(points, tip, state)
 

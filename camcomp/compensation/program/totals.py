@@ -98,10 +98,9 @@ class Totals:
     def add(self, result: Compensated, own: slice = slice(None), part: Part | None = None) -> JointTableRows:
         """Add the motions `part` of a result, None: of a whole program; own: their rows."""
         path = result.program.path
-        moves = np.arange(len(path)) if part is None else np.arange(part.first, part.last)
-        self.motions, self.method = self.motions + len(moves), result.method
         self._add_control(result, own, part)
-        path, engaged = path.take(moves), result.engaged
+        path, engaged = path if part is None else path.take(slice(part.first, part.last)), result.engaged
+        self.motions, self.method = self.motions + len(path), result.method
         if part is not None and engaged is not None:
             engaged = engaged.of_motions(part.first, part.last)
         for key, seen in stock_remarks(self.job.config, path, engaged).items():
@@ -172,9 +171,8 @@ class Totals:
         """Add rows (N,), and errors (k, 3) mm between them."""
         self.points += len(rows.line)
         self.joins += int(joining.sum())
-        change = np.abs(rows.joints - rows.nominal)[corrected]
-        self.change = np.fmax(self.change, np.fmax.reduce(change, axis=0, initial=0.0))
-        self.force = np.fmax(self.force, np.fmax.reduce(np.abs(rows.drive)[corrected], axis=0, initial=0.0))
+        self.change = np.fmax(self.change, _largest(rows.joints - rows.nominal, corrected))
+        self.force = np.fmax(self.force, _largest(rows.drive, corrected))
         self.tilt = float(np.fmax.reduce(sizes(tilt)[corrected], initial=self.tilt))
         self.before.add(before)
         self.after.add(after)
@@ -249,6 +247,11 @@ class Totals:
                 span = f"{k * low:g} to {k * high:g} {unit}"
                 out.append(("CC602", f"actuator {name} leaves its travel {span} at {named_lines(lines)}"))
         return out + interpolation_failed(self.interpolated)
+
+
+def _largest(values: Floats, on: Bools) -> Floats:
+    """Largest size (m,) in every column of some rows of values (N, m), without NaN; 0 without rows."""
+    return np.array([np.fmax.reduce(np.abs(each[on]), initial=0.0) for each in values.T])
 
 
 def warm_up_warnings(job: Job) -> list[str]:

@@ -21,7 +21,7 @@ from camcomp.gcode.path_mode import PathMode, numbered
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.records import dataclass, replace
-from camcomp.ground.vectors import sizes
+from camcomp.ground.vectors import largest, sizes
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves, mode_columns, moves_of
@@ -195,7 +195,7 @@ def may_pay_apart(control: UnderControl, rows: CorrectedRows, part: Part | None,
 
 def moved_cuts(rows: CorrectedRows) -> Bools:
     """Cuts (N,) that end elsewhere than programmed."""
-    return np.asarray((rows.kind != RAPID) & (rows.end != rows.target).any(axis=1))
+    return np.asarray((rows.kind != RAPID) & (largest(rows.end - rows.target) > 0.0))
 
 
 def under_control(
@@ -224,7 +224,7 @@ def under_control(
     row = points.row[judged]
     joining = np.concatenate((rows.joining, [False]))
     on_moves = PointsOnMoves(
-        move=row, commanded=told[judged], error=missed[judged], line=path.line[rows.motion[row]],
+        move=row, commanded=told.take(judged, axis=0), error=missed.take(judged, axis=0), line=path.line[rows.motion[row]],
         joined=joining[row - 1] | joining[row + 1],
     )  # fmt: skip
     cuts = np.flatnonzero((path.kind != RAPID) & ~path.machine)
@@ -276,8 +276,9 @@ def written_moves(program: Program, job: Job, rows: CorrectedRows, written: Rewr
     bent = np.isfinite(written.centre[:, 0])
     end = written.end
     start = np.concatenate((path.start[motion[:1]], end[:-1]))
-    centre = np.where(bent[:, None], written.centre, path.centre[motion])
-    axis = path.axis[motion]
+    centre, axis = written.centre.copy(), path.axis.take(motion, axis=0)
+    kept = np.flatnonzero(arc & ~bent)
+    centre[kept] = path.centre[motion[kept]]
     angle = rows.sweeps(path)
     angle[bent] = arcs_out.stated_sweeps(start[bent], end[bent], centre[bent], axis[bent], angle[bent])
     exact, stop, tolerance, merged = mode_columns(program.modes)

@@ -101,7 +101,8 @@ class Track:
 
     def u(self, piece: Ints, w: Floats) -> Floats:
         """Fraction of the motion at fraction w of the piece."""
-        return np.where(w == 1.0, self.u1[piece], self.u0[piece] + w * (self.u1[piece] - self.u0[piece]))
+        begin, end = self.u0[piece], self.u1[piece]
+        return np.where(w == 1.0, end, begin + w * (end - begin))
 
     def points(self, piece: Ints, w: Floats) -> Floats:
         """Programmed tip (k, 3) mm at fraction w (k,) of piece (k,)."""
@@ -137,17 +138,17 @@ class Track:
     def force(self, piece: Ints, w: Floats, feed: Floats | None = None) -> Floats:
         """Cutting force on the tool (k, 3) N, program frame; feed (k,) mm/min as driven, else the program's."""
         if feed is None and self.even[piece].all():
-            first, last = self._ends
-            return np.asarray(first[piece] + w[:, None] * last[piece])
+            out = np.empty((len(piece), 3))
+            path_geometry.between_ends(*self._ends, piece, w, out)
+            return out
         tangent = path_geometry.tangents(self.path, self.motion[piece], _beside(self, piece, w))
         out = self.force_along(piece, w, tangent, feed)
         return out + (1.0 - w)[:, None] * self.fade0[piece] + w[:, None] * self.fade1[piece]
 
     @cached_property
     def _ends(self) -> tuple[Floats, Floats]:
-        """Force (p, 3) N at the start of every piece, and by how much it differs at its end."""
-        first = self.own0 + self.fade0
-        return first, self.own1 + self.fade1 - first
+        """Force (p, 3) N at the start and at the end of every piece."""
+        return self.own0 + self.fade0, self.own1 + self.fade1
 
     def sizes(self, piece: Ints, w: Floats) -> tuple[Floats, Floats]:
         """Depth of the cut (k,) mm and sum of the engagement arcs (k,) rad, NaN if the stock is unknown."""
@@ -236,18 +237,18 @@ def _force(
     piece: Ints,
     w: Floats,
     direction: Floats,
-    height: Callable[[Bools], Floats],
+    height: Callable[[Ints], Floats],
     driven: Floats | None = None,
     turned: Floats | None = None,
 ) -> Floats:
     """Model force (k, 3) N for given feed directions, program frame.
 
-    height: z (mm) of the tips at points given by a mask (k,), for a depth below the stock's top. turned (k, 3, 3):
+    height: z (mm) of the tips at some of the points, for a depth below the stock's top. turned (k, 3, 3):
     rotation of the tool from the axis of the conditions. The model sees the feed in the frame of the tool.
     """
     out = np.zeros((len(piece), 3))
-    on = cutting[piece] & (sizes(direction) > 0.0)
-    if c.model is None or not on.any():
+    on = np.flatnonzero(cutting[piece] & (sizes(direction) > 0.0))
+    if c.model is None or not len(on):
         return out
     seen = direction if turned is None else np.einsum("kji,kj->ki", turned, direction)
     if load is not None and not c.plunges:
@@ -258,11 +259,11 @@ def _force(
         if c.depth_mm is None and c.stock_top_mm is not None:
             depth = c.stock_top_mm - height(on)
         found = _components(
-            path=path, c=c, motion=rows, direction=seen[on], depth=depth, width=width,
+            path=path, c=c, motion=rows, direction=seen.take(on, axis=0), depth=depth, width=width,
             s=s0[piece[on]] + w[on] * length[piece[on]], ends=w[on] == 1.0, arcs=None,
             driven=None if driven is None else driven[on],
         )  # fmt: skip
-    out[on] = to_vector(found, seen[on], c.tool_axis)
+    out[on] = to_vector(found, seen.take(on, axis=0), c.tool_axis)
     return out if turned is None else np.einsum("kij,kj->ki", turned, out)
 
 
@@ -279,7 +280,7 @@ def _components(
     tool = path.tool[motion]
     out = np.zeros((len(motion), 3))
     for number in np.unique(tool) if c.tools else [None]:
-        at = np.flatnonzero(tool == number) if number is not None else np.arange(len(motion))
+        at = np.flatnonzero(tool == number) if number is not None else slice(None)
         edges = c.edges(int(number)) if number is not None else Edges(c.diameter_mm, c.teeth)
         out[at] = c.model(
             Cut(
@@ -296,7 +297,7 @@ def _components(
                 to_machine=np.eye(3) if c.to_machine is None else c.to_machine,
                 ends=ends[at],
                 turn=path.turn[motion[at]],
-                arcs=None if arcs is None else arcs.of(at),
+                arcs=arcs if arcs is None or isinstance(at, slice) else arcs.of(at),
             )
         )
     return out
@@ -410,7 +411,7 @@ def _with_corners(track: Track, first: Floats, last: Floats, over: Bools) -> Tra
     b = np.flatnonzero(smooth)
     a = before[b]
     ahead, fade0, fade1 = np.zeros((n, 3)), np.empty((n, 3)), np.empty((n, 3))
-    ahead[b] = _end_force(track, a, np.ones(len(a)), bisector[b])
+    ahead[b] = _end_force(track, a, np.ones(len(a)), bisector.take(b, axis=0))
     behind, other = ahead.copy(), b[_differ(track, a, b)]
     behind[other] = _end_force(track, other, np.zeros(len(other)), bisector[other])
     share_loads(*pieces, before, smooth, own0, own1, ahead, behind, fade0, fade1, jump)

@@ -91,6 +91,8 @@ class Verticals:
 
     def beside(self, path: Path, tool_axis: Floats, motion: Ints, u0: Floats, u1: Floats) -> tuple[Floats, Floats]:
         """Fractions of the motion near both ends of parts (p,) at which the directions of the ends are taken."""
+        if not (path.kind == ARC).any():
+            return np.zeros(len(motion)), np.zeros(len(motion))
         upright = (path.kind[motion] == ARC) & (np.abs(path.axis[motion] @ np.asarray(tool_axis, float)) < 0.999)
         angle = np.where(upright, np.maximum(np.abs(path.angle[motion]), 4.0 * AT_END), 1.0)
         head = np.where(upright, AT_END / angle, 0.0)

@@ -14,6 +14,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.ground.records import dataclass, fields, replace
+from camcomp.ground.vectors import largest
 from camcomp.model import signal_path
 from camcomp.model.effect import Load, Motion
 from camcomp.model.finite import not_finite
@@ -184,8 +185,8 @@ def _turned(machine: Machine, told: Floats, rotation: Floats | None, **given: An
 
 def _finite(job: Job, tip: Floats, state: Correction) -> tuple[Floats, Correction]:
     """Return both unchanged. Raises PhysicsError CC306 for a solved point that is not finite."""
-    known = np.isfinite(tip).all(axis=1) & np.isfinite(state.drive).all(axis=1) & np.isfinite(state.rho).all(axis=1)
-    bad = ~known & (state.status == 0)
+    known = [np.isfinite(largest(each)) for each in (tip, state.drive, state.rho)]
+    bad = ~np.logical_and.reduce(known) & (state.status == 0)
     if bad.any():
         x, y, z = state.commanded[int(np.argmax(bad))]
         raise not_finite(job.config, f"the loaded tip at X{x:.4f} Y{y:.4f} Z{z:.4f} (machine frame, mm)")
