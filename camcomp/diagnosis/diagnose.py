@@ -150,12 +150,8 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
     p = np.ones(len(close)) if sets.rivals else sets.probability[close]
     fits = [sets.fits[j] for j in close]
     proposal = propose(problem, fits, p / p.sum(), job)
-    return None if proposal is None else with_outcomes(proposal, [_set_name(problem, f) for f in fits])
-
-
-def _set_name(problem: Problem, f: Fitted) -> str:
-    """A set of causes in words."""
-    return " and ".join(_named(problem, i).label for i in f.members) or ONLY_NOISE
+    names = [" and ".join(_named(problem, i).label for i in f.members) or ONLY_NOISE for f in fits]
+    return None if proposal is None else with_outcomes(proposal, names)
 
 
 # -- causes -----------------------------------------------------------------------------------------------------------
@@ -305,8 +301,11 @@ def _stage(problem: Problem, best: Fitted, found: CauseSearch, law: LawAnswer | 
     if found.unknown_in and left > max(energy, default=0.0):
         if law is not None:
             return law.law.on
-        stage = {"encoder": "control", "dyno": "process"}.get(found.unknown_in)
-        return stage or ("structure" if _first_label(found).startswith("force") else "drive")
+        stage, labels = (
+            {"encoder": "control", "dyno": "process"}.get(found.unknown_in),
+            found.left[found.unknown_in].labels,
+        )
+        return stage or ("structure" if labels and labels[0][0].startswith("force") else "drive")
     if energy:
         return str(problem.columns.candidates[best.members[int(np.argmax(energy))]].effect.STAGE)
     parts = {"control": slice(3, 3 + len(problem.bench.actuators)), "structure": slice(0, 3)}
@@ -316,11 +315,6 @@ def _stage(problem: Problem, best: Fitted, found: CauseSearch, law: LawAnswer | 
                  if np.isfinite(r[:, part]).any()]  # fmt: skip
         size[name] = float(np.mean(white)) if white else 0.0
     return max(size, key=lambda each: size[each])
-
-
-def _first_label(found: CauseSearch) -> str:
-    labels = found.left[found.unknown_in].labels if found.unknown_in else ()
-    return labels[0][0] if labels else ""
 
 
 def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[SpectralLine]) -> list[Driver]:
@@ -355,10 +349,6 @@ def _shrinkage(
         chosen = causes_without(problem, best, rivals, np.zeros(0) if found is None else found.sets.probability)
     floor = round(floor_um(problem), 3)
     return shrinkage_of(
-        problem, best, seen=seen, chosen=chosen, order=_by_energy(problem, best), part=main_channels(problem),
-        floor_um=floor,
+        problem, best, seen=seen, chosen=chosen, order=list(np.argsort([-e for e in _energies(problem, best)])),
+        part=main_channels(problem), floor_um=floor,
     )  # fmt: skip
-
-
-def _by_energy(problem: Problem, f: Fitted) -> list[int]:
-    return list(np.argsort([-e for e in _energies(problem, f)]))

@@ -7,7 +7,7 @@ ISO 230-2 needs at least five unloaded stops on a line of one axis, each approac
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -130,5 +130,5 @@ def _positioning(axis: int, beside: Sequence[float], found: Sequence[_Stop]) -> 
         line=" ".join(f"{name}{value:g}" for name, value in zip(others, beside, strict=True)),
         targets=len(whole),
         approaches=min(len(way) for ways in whole for way in ways),
-        **{f"{name}_um": _um(1e3 * value) for name, value in asdict(values).items()},
+        **{f"{name}_um": _um(1e3 * value) for name, value in values.items()},
     )

@@ -22,7 +22,9 @@ def causes_without(
     runs = range(len(problem.bench.runs))
     if len(runs) == 1 or not best.members:
         return [_by_candidate(problem, best, best.members, best.theta)] * len(runs)
-    rivals = [fits[j] for j in np.argsort(-probability) if _is_rival(fits[j].members, best.members)][:MOST_SETS]
+    ranked, own = [fits[j] for j in np.argsort(-probability)], set(best.members)
+    # neither a part of the best one, which is tried anyway, nor a larger one
+    rivals = [f for f in ranked if not set(f.members) <= own and len(f.members) <= len(own)][:MOST_SETS]
     tried = [(best, part) for part in parts_of(best.members)] + [(f, f.members) for f in rivals]
     temperature = temperature_of(best, problem.prior, problem.member_columns(best.members))
 
@@ -35,11 +37,6 @@ def causes_without(
         f, members = max(tried, key=lambda each: value(k, *each))
         out.append(_by_candidate(problem, f, members, problem.theta_without(f, k, members)))
     return out
-
-
-def _is_rival(members: Members, best: Members) -> bool:
-    """Whether a set is another answer: neither a part of the best one, which is tried anyway, nor a larger one."""
-    return not (set(members) <= set(best) or len(members) > len(best))
 
 
 def _by_candidate(problem: Problem, f: Fitted, members: Members, theta: Floats) -> dict[int, Cause]:

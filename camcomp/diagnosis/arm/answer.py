@@ -11,7 +11,7 @@ from scipy.stats import norm
 from camcomp.diagnosis.answer.minor import MOST_LISTED
 from camcomp.diagnosis.arm.case import PoseCase
 from camcomp.diagnosis.arm.curves import curve_cause
-from camcomp.diagnosis.arm.linear import covariate_of
+from camcomp.diagnosis.arm.linear import BY
 from camcomp.diagnosis.arm.poses import CURVE
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
@@ -19,7 +19,7 @@ from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.folds import REGIONS, without_nuisances
 from camcomp.diagnosis.model.group import split_regions
 from camcomp.diagnosis.model.noise import HEALTHY, LEAST_VALUES, MINOR
-from camcomp.diagnosis.model.verdict import VerdictInputs, decide
+from camcomp.diagnosis.model.verdict import decide
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
     Driver,
@@ -92,7 +92,7 @@ def parameters_of(case: PoseCase, on: Sequence[int]) -> dict[str, Estimate]:
 def verdict(case: PoseCase, named: Sequence[FoundCause]) -> Any:
     """The word of the result."""
     calibrate = calibration_of(case.kind).calibrate
-    inputs = VerdictInputs(
+    return decide(
         unknown=case.unmodelled,
         best=min([_best(case, calibrate), *(c.probability for c in named)]),
         alternatives=len(case.alternatives()) - 1,
@@ -100,7 +100,6 @@ def verdict(case: PoseCase, named: Sequence[FoundCause]) -> Any:
         known_noise=case.floor is not None,
         confirmed=None if case.check is None else case.check.at_floor,
     )
-    return decide(inputs)
 
 
 def _best(case: PoseCase, calibrate: Callable[[float], float]) -> float:
@@ -184,7 +183,7 @@ def drivers(case: PoseCase, intervals: Sequence[IntervalShare]) -> tuple[Driver,
     before = _energy(residuals(case.model, plain, found.members))
     for name in clear & set(gains):
         after = _energy_beside(case, gains[name][1])
-        key = covariate_of(name)
+        key = name.split(BY)[0]
         shares[key] = max(shares.get(key, 0.0), min(max(1.0 - after / max(before, 1e-300), 0.0), 1.0))
     if found.background.process is not None and found.background.process.over == "time":
         shares.setdefault("time", max(shares.values(), default=0.0))

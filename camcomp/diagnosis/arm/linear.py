@@ -17,7 +17,6 @@ from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Column
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, Place, PlacedCause
 from camcomp.diagnosis.model.discrepancy import covariate_columns, smooth_functions
 from camcomp.diagnosis.model.evidence import LinearModel
-from camcomp.diagnosis.model.group import Group
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.arm import joint_lines
 from camcomp.model.statics.hanging import Hung
@@ -106,7 +105,11 @@ def linearise(
 ) -> LinearModel:
     """The model of a bench at amplitudes (k,), or at none; sd: noise, mm per coordinate, times weights (n,) of campaigns."""
     on = {} if at is None else {int(j): float(at[j]) for j in np.flatnonzero(at)}
-    groups = with_dictionary(bench, bench.groups(shelf.columns, sd, on), sd)
+    functions = dictionary(bench, sd)
+    groups = [
+        replace(g, B={name: columns[k] for name, columns in functions.items()})
+        for k, g in enumerate(bench.groups(shelf.columns, sd, on))
+    ]
     if weights is not None:
         groups = [replace(g, sd=g.sd * w[:, None]) for g, w in zip(groups, weights, strict=True)]
     healthy = {DRIFT: DRIFT_FLOORS} if DRIFT in groups[0].B else {}
@@ -114,12 +117,6 @@ def linearise(
         groups=tuple(groups), candidates=shelf.candidates, bounds=shelf.bounds, fitted=bench.own,
         families=shelf.families, healthy=healthy,
     )  # fmt: skip
-
-
-def with_dictionary(bench: ArmBench, groups: Sequence[Group], sd: float) -> list[Group]:
-    """Groups with the functions of every covariate."""
-    own = dictionary(bench, sd)
-    return [replace(g, B={name: columns[k] for name, columns in own.items()}) for k, g in enumerate(groups)]
 
 
 def dictionary(bench: ArmBench, sd: float) -> dict[str, list[Floats]]:
@@ -152,11 +149,6 @@ def dictionary(bench: ArmBench, sd: float) -> dict[str, list[Floats]]:
     if len(known) == len(heat) and np.ptp(np.concatenate(known)) > STEADY_K:
         out["temperature"] = _of(known, axes)
     return out
-
-
-def covariate_of(name: str) -> str:
-    """The covariate of an entry of the dictionary, without the joint by which it acts."""
-    return name.split(BY)[0]
 
 
 def _of(values: Sequence[Floats], directions: Sequence[Floats]) -> list[Floats]:

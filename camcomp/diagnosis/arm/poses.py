@@ -211,7 +211,11 @@ class ArmBench:
                 own = _for(module, self.drive(target or self.actuators[0]).revolute)
                 shapes: list[EffectShape] = [()]
                 if scanned := any(p.scan for p in own):
-                    shapes = _shapes(own, self._warm) if timed and _is_of_arm(module) else []
+                    shapes = (
+                        _shapes(own, self._warm)
+                        if timed and (hasattr(module, "on_drive") or hasattr(module, "on_links"))
+                        else []
+                    )
                 found += [Column(name, target, module, p, s) for s in shapes for p in own if not (scanned and p.shape)]
         return found
 
@@ -249,19 +253,20 @@ class ArmBench:
         causes = combined(columns, amounts)
         out = []
         for k, campaign in enumerate(self.campaigns):
-            frame = self.registration(k, causes)
+            frame, owner = self.registration(k, causes), self.owner[k]
             stood = self.standing(campaign, causes)
             here = stood.tips(frame)
             X = self._motion(campaign, columns, amounts, frame, here)
             left = frame.to_machine(campaign.tip) - here
             for j, amount in amounts.items():
                 left = left + X[:, :, j] * amount
-            N = nuisance_columns(here, stood.hung.rotation, self._about(k))
+            about = self.start[owner].to_machine(self.campaigns[owner].tip).mean(axis=0)
+            N = nuisance_columns(here, stood.hung.rotation, about)
             clock = campaign.order if campaign.has_clock else None
             noise = np.full(left.shape, sd)
             out.append(
                 Group(
-                    name=f"{campaign.run[0]}", label=self.owner[k], y=left, A=X, N=N, sd=noise,
+                    name=f"{campaign.run[0]}", label=owner, y=left, A=X, N=N, sd=noise,
                     position=self.features(campaign), order=clock,
                 )
             )  # fmt: skip
@@ -282,7 +287,8 @@ class ArmBench:
         waves = [j for j, column in enumerate(columns) if column.effect == CURVE]
         X[:, :, waves] = wave_motion(joints, self.actuators, campaign.q, [columns[j] for j in waves])
         for j in sorted(set(range(len(columns))) - set(waves)):
-            if is_of_drive(columns[j]) and j not in amounts:
+            module = columns[j].module
+            if signal_path.stages_of(module) == {"drive"} and not signal_path.pushes(module) and j not in amounts:
                 X[:, :, j] = self._drive_motion(campaign, joints, columns[j])
                 continue
             moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + SHARE_OF_SCALE})
@@ -299,11 +305,6 @@ class ArmBench:
         cause = replace(cause, values=complete(cause))
         error, _ = signal_path.driven([cause], self.actuators, _standing(self.robot, campaign))
         return np.asarray(np.einsum("nim,nm->ni", joints, error), float)
-
-    def _about(self, k: int) -> Floats:
-        """Point (3,) about which the frame of a campaign turns."""
-        owner = self.owner[k]
-        return np.asarray(self.start[owner].to_machine(self.campaigns[owner].tip).mean(axis=0), float)
 
     def joint_motion(self, poses: Poses, causes: Sequence[Cause], at: Registration) -> Floats:
         """Motion (n, 3, m) of tips, machine frame, mm per rad (mm) by which a joint stands off its encoder."""
@@ -384,16 +385,6 @@ def _public(cause: Cause) -> Cause:
         return cause
     fitted = getattr(cause.effect, "FITTED", cause.effect.PARAMETERS)
     return replace(cause, values=public({**{p.name: p.nominal for p in fitted}, **cause.values}))
-
-
-def is_of_drive(column: Column) -> bool:
-    """Whether a column acts between encoder and joint alone."""
-    return signal_path.stages_of(column.module) == {"drive"} and not signal_path.pushes(column.module)
-
-
-def _is_of_arm(module: Any) -> bool:
-    """Whether an effect acts at drives or links."""
-    return hasattr(module, "on_drive") or hasattr(module, "on_links")
 
 
 def _for(module: Any, turns: bool) -> tuple[Parameter, ...]:

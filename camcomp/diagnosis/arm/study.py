@@ -26,7 +26,7 @@ from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrink
 from camcomp.diagnosis.model.discrepancy import residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.explain import STATED, Explanation, KnownNoise, explain
-from camcomp.diagnosis.model.noise import StatedDeviation
+from camcomp.diagnosis.model.noise import StatedDeviation, rounding_noise
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, GapSize, Outlier
 from camcomp.diagnosis.statistics.probability import EVEN, SEED
@@ -71,7 +71,9 @@ def solve(
             hidden = found.unknown > EVEN and found.background.unknown and second[1].unknown <= EVEN
             floor, (shelf, found) = (least, (shelf, found)) if hidden else (floor, second)
     amount, covariance = found.amplitudes()
-    notes = tuple(f"positions are rounded to {step:g} mm" for step in [coarse_step(bench, sd)] if step)
+    step = max(resolution(each.tip) for each in bench.campaigns)
+    coarse = rounding_noise(step) > EVEN * sd  # a fair part of the noise
+    notes = (f"positions are rounded to {step:g} mm",) if coarse else ()
     final = floor.sd if floor else sd * found.background.noise
     return PoseCase(
         bench=bench, shelf=shelf, explanation=found, amount=amount, covariance=covariance, floor=floor, sd=final,
@@ -197,12 +199,6 @@ def settled_floor(
     both = [tip_floor(bench.robot, bench.campaigns, each, stated) for each in (gaps, beside)]
     shown = min((one for one in both if one), key=lambda one: one.sd, default=least)
     return shown, bool(shown.sd > np.exp(STATED) * least.sd)
-
-
-def coarse_step(bench: ArmBench, sd: float) -> float:
-    """Step of the positions, mm, where rounding to it is a fair part of the noise; else 0."""
-    step = max(resolution(each.tip) for each in bench.campaigns)
-    return step if step / np.sqrt(12.0) > EVEN * sd else 0.0
 
 
 # -- campaigns ----------------------------------------------------------------------------------------------------------

@@ -114,19 +114,16 @@ def _without_needless(
         every = tuple(range(len(own)))
         sets = [every, *(tuple(i for i in every if i != out) for out in every)]
         fits = {on: _settled(data, own, at, on=on, sd=sd) for on in sets}
-        value = {on: _beside_functions(fit) for on, fit in fits.items()}
+        value = {
+            on: found.log_evidence + max(0.0, *gains_of_more(fit.model, found.background, found.members).values())
+            for on, fit in fits.items() for found in [fit.found]
+        }  # fmt: skip
         best = max(sets[1:], key=lambda on: value[on])
         more = misfit(fits[best], own) - misfit(fits[every], own)
         if value[best] < value[every] and more > (MINOR * data.floor) ** 2:
             break
         terms, linear = own, fits[best]
     return terms, linear
-
-
-def _beside_functions(linear: _Linear) -> float:
-    """Log evidence of the set of a fit, jointly with the function of one covariate that goes best with it, or with none."""
-    found = linear.found
-    return found.log_evidence + max(0.0, *gains_of_more(linear.model, found.background, found.members).values())
 
 
 def _settled(

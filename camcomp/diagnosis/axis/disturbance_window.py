@@ -117,16 +117,12 @@ def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
 
 def away_from_ends(first: int, last: int, time: Floats) -> tuple[Bools, Bools]:
     """Rows (n,) inside a window and outside of it that are further than SHARP_S from both of its ends; all, where none are."""
-    far = ~_at_ends(first, last, time)
+    ends = time[[first, min(last, len(time) - 1)]]
+    far = np.min(np.abs(time[:, None] - ends), axis=1) >= SHARP_S
     inside = np.zeros(len(time), bool)
     inside[first:last] = True
     inside, outside = (on & far if np.any(on & far) else on for on in (inside, ~inside))
     return inside, outside
-
-
-def _at_ends(first: int, last: int, time: Floats) -> Bools:
-    ends = time[[first, min(last, len(time) - 1)]]
-    return np.asarray(np.min(np.abs(time[:, None] - ends), axis=1) < SHARP_S)
 
 
 def sharp(window: Window, rest: Floats, time: Floats) -> bool:

@@ -87,18 +87,15 @@ def motion_of(
     by_encoder = misfit(encoders) < (ENCODER_BETTER if bodies is None else 1.0) * misfit(setpoints)
     if followed is not None and not by_encoder:
         setpoints = narrowest(followed, 0.0)
-    begun = [r.time >= r.time[0] + late * (_fades(r.gap) if k in train else 0.0) for k, r in enumerate(runs)]
+    # time constants after which a late axis shows no more how it moved before its log began
+    fades = [max(float(np.log(max(np.abs(r.gap).max(), 1e-300) / REPEATABILITY_MM)), 0.0) for r in runs]
+    begun = [r.time >= r.time[0] + late * (fades[k] if k in train else 0.0) for k, r in enumerate(runs)]
     return kept(encoders if by_encoder else setpoints, begun)
 
 
 def _beside(bodies: list[Floats] | None, runs: list[AxisRun], which: list[int]) -> list[Floats]:
     """Columns (n, b) of bodies of some runs."""
     return [np.zeros((len(runs[k].time), 0)) if bodies is None else bodies[k] for k in which]
-
-
-def _fades(gap: Floats) -> float:
-    """Time constants after which a late axis shows no more how it moved before its log began."""
-    return max(float(np.log(max(np.abs(gap).max(), 1e-300) / REPEATABILITY_MM)), 0.0)
 
 
 def _usual(m: AxisTravel) -> Floats:

@@ -27,7 +27,7 @@ from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, travel
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM, StatedDeviation
-from camcomp.diagnosis.model.verdict import VerdictInputs, Word, decide
+from camcomp.diagnosis.model.verdict import Word, decide
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.standards import StandardValues
 from camcomp.diagnosis.result.types import (
@@ -126,12 +126,10 @@ def _every_axis(
 def _verdict(found: Sequence[AxisFindings]) -> Word:
     """The verdict; gates that are open leave residuals unconfirmed."""
     causes = [c for a in found for c in a.causes]
-    inputs = VerdictInputs(
+    return decide(
         unknown=float(any(a.strange for a in found)), best=min((c.probability for c in causes), default=1.0),
-        alternatives=0, causes=len(causes), known_noise=True,
-        confirmed=all(c.gate is not None and c.gate.word == "at" for a in found for c in a.channels),
+        causes=len(causes), confirmed=all(c.gate is not None and c.gate.word == "at" for a in found for c in a.channels),
     )  # fmt: skip
-    return decide(inputs)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

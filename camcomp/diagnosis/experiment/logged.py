@@ -47,10 +47,5 @@ class Logged:
     def over_time(self, values: Floats, known: Bools | None = None) -> Floats:
         """Values (n, c) with empty cells, and rows that are not known (n,), interpolated over time."""
         seen = values if known is None else np.where(known[:, None], values, np.nan)
-        return np.column_stack([_over_time(self.measured.time, v) for v in seen.T])
-
-
-def _over_time(time: Floats, values: Floats) -> Floats:
-    """Values (n,) with empty cells interpolated over time."""
-    known = np.isfinite(values)
-    return np.interp(time, time[known], values[known])
+        time, there = self.measured.time, np.isfinite(seen)
+        return np.column_stack([np.interp(time, time[on], v[on]) for v, on in zip(seen.T, there.T, strict=True)])

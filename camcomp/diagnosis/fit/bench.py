@@ -68,11 +68,6 @@ def fitted(candidate: CandidateCause) -> tuple[Parameter, ...]:
     return tuple(each for each in own if each.name not in candidate.without)
 
 
-def public_values(effect: Any, values: Mapping[str, float]) -> dict[str, float]:
-    """Parameter values of an effect's file from the fitted ones."""
-    return dict(effect.public(values)) if hasattr(effect, "public") else dict(values)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Run:
     """A run on the bench: its run path, what was measured, its labels, and a factor by which rows are thinned."""
@@ -269,7 +264,8 @@ def means(values: Floats, ways: Floats, factor: int) -> Floats:
 def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cause:
     """The cause at fitting coordinates by parameter name; a missing coordinate takes its nominal value."""
     values = {p.name: p.value(coordinates.get(p.name, p.nominal if p.shape else 0.0)) for p in fitted(candidate)}
-    return Cause(candidate.name, candidate.effect, candidate.target, public_values(candidate.effect, values))
+    public = getattr(candidate.effect, "public", dict)  # what its file has, where others are easier to fit
+    return Cause(candidate.name, candidate.effect, candidate.target, public(values))
 
 
 def step_of(parameter: Parameter) -> float:

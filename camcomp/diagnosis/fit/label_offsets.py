@@ -7,7 +7,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run
 from camcomp.diagnosis.fit.columns import CLOCK_JITTER_S, Columns
-from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name, scatter, scattering
+from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name, scatter
 from camcomp.diagnosis.statistics.noise_model import weighted_median
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
@@ -66,7 +66,7 @@ def with_scatter(columns: Columns, bench: Bench, amplitude: Floats) -> Columns:
     tolerance = columns.prior.tolerance.copy()
     for label, effect in EFFECT_OF.items():
         labels = [getattr(run, label) for run in bench.runs]
-        if not scattering(labels):
+        if len(set(labels)) < 2 or None in labels:  # they differ from what the runs without one share
             continue
         first = {each: next(run for run in bench.runs if getattr(run, label) == each) for each in apart(labels)}
         for p in CandidateCause(effect, None, shelf.load("effects", effect)).parameters:

@@ -21,11 +21,6 @@ def apart(labels: Sequence[Label]) -> list[str | int]:
     return [each for each in every if each is not None] if len(every) > 1 else []
 
 
-def scattering(labels: Sequence[Label]) -> bool:
-    """Whether labels scatter about a common mean, because every run has one."""
-    return len(set(labels)) > 1 and None not in labels
-
-
 def scatter(offsets: Floats) -> float:
     """Upper bound of the standard deviation of offsets (labels,) about their mean, by Student's t for few labels."""
     few = -float(stdtrit(len(offsets) - 1, ndtr(-1.0)))

@@ -31,7 +31,12 @@ def without_lookalikes(bench: Bench, candidates: Sequence[CandidateCause]) -> li
     asked = [each for each in candidates if hasattr(each.effect, "SOUGHT")]
     if not asked or not any(run.measured.has("tip") for run in bench.runs):
         return [each for each in candidates if each not in asked]
-    simple = [each for each in candidates if each not in asked and _geometric(each)]
+    by_place = {"drive", "tool", "workpiece"}  # stages of what may depend on the place alone
+    simple = [
+        each
+        for each in candidates
+        if each not in asked and not each.shapes and by_place & signal_path.stages_of(each.effect)
+    ]
     frame = _tips(bench, [each for each in simple if each.name == _FRAME])
     others = [_tips(bench, [each]) for each in simple if each.name != _FRAME]
     kept: list[CandidateCause] = []
@@ -78,11 +83,6 @@ def _a_shift_per_run(bench: Bench, candidate: CandidateCause) -> bool:
         if whole > 0.0 and within > whole / LARGE**2:
             return False
     return True
-
-
-def _geometric(candidate: CandidateCause) -> bool:
-    """Whether a cause may depend on the place alone."""
-    return bool(signal_path.stages_of(candidate.effect) & {"drive", "tool", "workpiece"}) and not candidate.shapes
 
 
 def _tips(bench: Bench, candidates: Sequence[CandidateCause]) -> Floats:

@@ -45,11 +45,6 @@ def instrument_noise(bench: Bench, floor: NoiseFloor, least: Floats, times: Sequ
     return Noise(sigma, slow, memory)
 
 
-def less_certain(noise: Noise, extra: Sequence[Floats], heavy: Sequence[Floats]) -> list[Floats]:
-    """Per run (n, c) >= 1, NaN where no value: extra in mm or N as `inflation` says, heavy as of readings far off."""
-    return [np.sqrt(1.0 + (e / s) ** 2) * h for e, s, h in zip(extra, noise.sigma, heavy, strict=True)]
-
-
 def inflation(bench: Bench) -> list[Floats]:
     """Per run (n, c) >= 1: rows just after a step of the acceleration or after an unknown motion count less; NaN where no value.
 

@@ -19,7 +19,7 @@ from camcomp.diagnosis.fit.floor import least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, reduced_residual, settled_interval
 from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
-from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
+from camcomp.diagnosis.fit.noise import inflation, instrument_noise
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.problem import Problem
@@ -42,7 +42,8 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in bench.runs]
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
     noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
-    inflate = less_certain(noise, inflation(bench), tails(bench))
+    every = zip(inflation(bench), noise.sigma, tails(bench), strict=True)
+    inflate = [np.sqrt(1.0 + (extra / sigma) ** 2) * heavy for extra, sigma, heavy in every]
     guessed = {i: guess for i, each in enumerate(candidates) if (guess := first_guess(bench, each)) is not None}
     columns = build(bench, candidates, guessed, floor.tip_um, MINOR * floor.tip_um)
     shapes: dict[int, dict[str, float]] = {

@@ -110,10 +110,6 @@ class Problem:
         """The same of columns over the channels of run k, n rows each."""
         return self.noise.by_channel(k, columns, self.inflate[k], self.times[k])
 
-    def _white_at(self, readings: Sequence[Reading]) -> list[Floats]:
-        """White residuals (w,) of all runs at readings."""
-        return [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
-
     def causes(self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]) -> list[Cause]:
         """Causes at coordinates theta (d,)."""
         out, at = [], 0
@@ -182,7 +178,7 @@ class Problem:
             if step >= passes and not far:
                 break
             theta, readings = self._readings(members, theta, shapes)
-            now = self._white_at(readings)
+            now = [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
             bend = self._bend(now, index, theta)
             if step == 0 and not shapes and bend < STRAIGHT:
                 theta = self._bounded(members, estimate(total(grams), self.prior, index)[0][index])

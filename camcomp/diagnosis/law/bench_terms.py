@@ -153,9 +153,9 @@ class TermBench(TermRows):
         if key not in self._rows:
             bench = self.bench
             self._rows[key] = (
-                list(_tip_rows(bench))
+                [TipRows(r.tip, Load(r.dyno, np.zeros((len(r.tip), 6))), r.motion) for r in bench.nominal]
                 if key[0] == "tip"
-                else list(_drive_rows(bench, spot.index, setpoints=spot.on == "control"))
+                else [*_drive_rows(bench, spot.index, setpoints=spot.on == "control")]
             )
         return self._rows[key]
 
@@ -180,17 +180,14 @@ class TermBench(TermRows):
             out.append(thinned(moved.reshape(len(v), -1), run.thin).reshape(-1, 3, v.shape[1]))
         return out
 
-    def _seen_by_encoders(self, k: int) -> bool:
-        run = self.bench.runs[k]
-        return run.by == "setpoint" and run.measured.has("encoder")
-
     def _reach(self, spot: Spot, k: int) -> tuple[list[int], Floats]:
         """The channels that a spot reaches in run k, and by how much (c, n) each moves per unit at the spot."""
         if (spot, k) not in self._reaches:
-            n = len(self.bench.runs[k].run_path.time)
-            if spot.on == "structure" and self.bench.runs[k].turn is None:
+            run = self.bench.runs[k]
+            n = len(run.run_path.time)
+            if spot.on == "structure" and run.turn is None:
                 self._reaches[spot, k] = [spot.index], np.ones((1, n))
-            elif spot.on == "control" and self._seen_by_encoders(k):
+            elif spot.on == "control" and run.by == "setpoint" and run.measured.has("encoder"):
                 self._reaches[spot, k] = [3 + spot.index], np.ones((1, n))
             else:
                 ways = np.ascontiguousarray(self.bench.turned(k, self.tip_ways(spot)[k]).T)
@@ -240,12 +237,6 @@ def _load_names(robot: Robot, j: int) -> tuple[str, ...]:
         own,
         *(f"load_{name}_{unit}" for k, (name, unit) in enumerate(units) if k != j and f"load_{name}".isidentifier()),
     )
-
-
-def _tip_rows(bench: Bench) -> list[TipRows]:
-    """Per run."""
-    readings = bench.nominal
-    return [TipRows(r.tip, Load(r.dyno, np.zeros((len(r.tip), 6))), r.motion) for r in readings]
 
 
 def _drive_rows(bench: Bench, j: int, *, setpoints: bool) -> list[DriveRows]:

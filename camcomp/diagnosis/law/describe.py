@@ -14,7 +14,7 @@ from camcomp.diagnosis.law.find import FoundLaw, strengths
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.words import law_sentence, law_sum, listed
 from camcomp.diagnosis.result.types import Law, LawPart, LawTerm, Stage, six_digits
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Floats
 from camcomp.model.law.expression import parse
 
 _AXES = "xyz"
@@ -34,7 +34,7 @@ def law_result(bench: TermRows, found: FoundLaw, before_um: float, after_um: flo
         says = law_sentence([each for each in forms if isinstance(each, Form)])
     if alike:
         says += f" These data cannot tell it from {listed(list(alike)[:3])}."
-    formula = "; ".join(f"{_where(spot, actuators)} = {_equation(each)}" for spot, each in parts)
+    formula = "; ".join(f"{_where(spot, actuators)} = {each.formula or _over(each.over)}" for spot, each in parts)
     envelope = {name: limits for _, each in parts for name, limits in each.envelope.items()}
     return Law(
         formula=formula, on=_stage(bench, found), terms=tuple(terms), envelope=envelope, after_rms_um=round(after_um, 3),
@@ -97,7 +97,7 @@ def _map_parts(
         low, high = six_digits(theta.min()), six_digits(theta.max())
         terms.append(
             LawTerm(
-                term=f"{_where(term.spot, actuators)}: map over {listed(term.form.about)}", value=max(abs(low), abs(high)),
+                term=f"{_where(term.spot, actuators)}: {_over(term.form.about)}", value=max(abs(low), abs(high)),
                 ci95=(low, high), unit=_unit(bench, term.spot, ""),
             )
         )  # fmt: skip
@@ -140,8 +140,8 @@ def where_of(part: LawPart) -> str:
     return f"tip {part.axis}" if part.axis else f"{part.stage} {part.target}"
 
 
-def _equation(part: LawPart) -> str:
-    return part.formula or f"map over {listed(part.over or ())}"
+def _over(about: Sequence[str] | None) -> str:
+    return f"map over {listed(about or ())}"
 
 
 def _unit(bench: TermRows, spot: Spot, per: str) -> str:
@@ -153,11 +153,7 @@ def moved_without(bench: TermBench, found: FoundLaw) -> list[Floats]:
     out = [np.zeros((len(t), 3)) for t in bench.times]
     for term, theta in zip(found.terms, found.by_term(found.theta_without), strict=True):
         for k, moved in enumerate(bench.moves(term.spot, bench.values(term.spot, term.form))):
-            out[k] += np.einsum("nic,nc->ni", moved, theta[_part_of_rows(found, bench.times[k], k)])
+            time, split = bench.times[k], found.folds.split
+            place = (time - time[0]) / max(float(time[-1] - time[0]), 1e-12)
+            out[k] += np.einsum("nic,nc->ni", moved, theta[k * split.parts + split.of(place)])
     return out
-
-
-def _part_of_rows(found: FoundLaw, time: Floats, k: int) -> Ints:
-    """Which part every row (n,) of run k belongs to."""
-    place = (time - time[0]) / max(float(time[-1] - time[0]), 1e-12)
-    return k * found.folds.split.parts + found.folds.split.of(place)

@@ -13,7 +13,7 @@ from itertools import combinations
 
 import numpy as np
 
-from camcomp.diagnosis.law.bench_terms import Spot, Term, TermRows
+from camcomp.diagnosis.law.bench_terms import Term, TermRows
 from camcomp.diagnosis.law.folds import ALTERNATING, Folds, RunColumns, Split, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.screen import Screen, TermGrid
@@ -105,12 +105,15 @@ class _Search:
             step = self._beside(chosen)
             ranked = [each for each in self.screen.gains(step) if each[0] > 0.0]
             fine = [self._refined(step, term) for _, term in self._leaders(ranked)]
-            fine += [self._refined(step, Term(spot, t.form)) for t in chosen for spot in self._spots_beside(t)]
+            # the other spots at which the same function of the same covariates can act
+            where = [(t, s) for t in chosen for each in self.grids if t.spot in each.spots for s in each.spots]
+            fine += [self._refined(step, Term(spot, t.form)) for t, spot in where if spot != t.spot]
             if not fine:
                 break
             fine.sort(key=lambda each: -each[0])
             pool += [term for _, term in fine[: 2 * REFINED]]
-            best = self._simplest(fine)
+            near = [term for score, term in fine if score > fine[0][0] - EQUAL_LOG_ODDS]
+            best = min(near, key=lambda t: (t.form.family not in _PLAIN, len(t.form.shape), unlikely(t)))
             after = self._score((*chosen, best))
             if after < score + EQUAL_LOG_ODDS:
                 break
@@ -130,10 +133,6 @@ class _Search:
             if self._score(more) > self._score(chosen) + EQUAL_LOG_ODDS:
                 chosen = more
         return chosen
-
-    def _spots_beside(self, term: Term) -> list[Spot]:
-        """The other spots at which the same function of the same covariates can act."""
-        return [s for each in self.grids for s in each.spots if term.spot in each.spots and s != term.spot]
 
     # -- one step ------------------------------------------------------------------------------------------------------
 
@@ -165,12 +164,6 @@ class _Search:
     def _costs(self, terms: Sequence[Term]) -> float:
         """Log odds against terms: their kinds are equally likely, and shapes were looked for among many."""
         return sum(EQUAL_LOG_ODDS * len(t.form.shape) + self.per_term for t in terms)
-
-    @staticmethod
-    def _simplest(fine: Sequence[tuple[float, Term]]) -> Term:
-        """Of the terms that are as good as the best, one of a plain kind."""
-        near = [term for score, term in fine if score > fine[0][0] - EQUAL_LOG_ODDS]
-        return min(near, key=lambda t: (t.form.family not in _PLAIN, len(t.form.shape), unlikely(t)))
 
     # -- sets ----------------------------------------------------------------------------------------------------------
 

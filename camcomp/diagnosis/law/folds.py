@@ -79,7 +79,8 @@ class Folds:
             for k, own in enumerate(places)
             for i in range(split.parts)
         ]
-        self._grams = [self._gram(k, rows) for k, rows in self.parts]
+        each = [(self.white[k][rows], self.residual[k][rows]) for k, rows in self.parts]
+        self._grams = [(W.T @ W, W.T @ r) for W, r in each]
         if constants:
             loose = np.full(sum(each[0].width for each in constants), 1e-6)
             self._put(constants, loose)
@@ -100,19 +101,12 @@ class Folds:
         self.precision = np.concatenate([self.precision, precision])
 
     def _factorise(self) -> None:
-        self._halves = [self._half(A) for A in _without_each([A for A, _ in self._grams])]
+        every = [A + np.diag(self.precision) for A in _without_each([A for A, _ in self._grams])]
+        self._halves = [np.asarray(np.linalg.cholesky(M + 1e-12 * np.diag(np.diag(M)))) for M in every]
         self._targets = [
             np.asarray(solve_triangular(L, b, lower=True))
             for L, b in zip(self._halves, _without_each([b for _, b in self._grams]), strict=True)
         ]
-
-    def _gram(self, k: int, rows: Ints | slice) -> tuple[Floats, Floats]:
-        W = self.white[k][rows]
-        return W.T @ W, W.T @ self.residual[k][rows]
-
-    def _half(self, A: Floats) -> Floats:
-        M = A + np.diag(self.precision)
-        return np.asarray(np.linalg.cholesky(M + 1e-12 * np.diag(np.diag(M))))
 
     def means(self, more: Sequence[RunColumns], precision: Floats) -> Floats:
         """Coordinates (f, k) of the base, fitted jointly with law columns of that prior precision: with all data, and

@@ -12,20 +12,15 @@ def within_floor(result: DiagnosisResult, *, in_forces: bool = False) -> Diagnos
 
     in_forces: the unmodelled part shows in forces, which positions at their floor do not exclude.
     """
-    floor, unseen = result.gap.noise_floor_um, result.shrinkage
-    if floor is None or result.verdict == "none" or not _has_positions_above(result):
+    floor, unseen, actuators = result.gap.noise_floor_um, result.shrinkage, result.gap.actuators.values()
+    in_positions = not actuators or any(each.rms > each.floor for each in actuators)
+    if floor is None or result.verdict == "none" or not in_positions:
         return result
     if result.gap.rms_um <= floor:
         return _without_gap(result)
     if result.verdict == UNKNOWN and unseen is not None and unseen.after_rms_um < floor and not in_forces:
         return _without_unknown(result)
     return result
-
-
-def _has_positions_above(result: DiagnosisResult) -> bool:
-    """Whether the gap is one of positions; where all actuators are at their floors, the verdict is one of forces."""
-    actuators = result.gap.actuators.values()
-    return not actuators or any(each.rms > each.floor for each in actuators)
 
 
 def _without_gap(result: DiagnosisResult) -> DiagnosisResult:

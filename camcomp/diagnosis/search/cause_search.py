@@ -11,7 +11,7 @@ from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
 from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.model.search import ROUNDS
-from camcomp.diagnosis.model.verdict import VerdictInputs, Word, decide
+from camcomp.diagnosis.model.verdict import Word, decide
 from camcomp.diagnosis.search.credible import MODELLED, credibility
 from camcomp.diagnosis.search.fitted_sets import FittedSets
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
@@ -140,10 +140,8 @@ def _stated(sets: RankedSets, kept: _Kept) -> dict[int, float]:
 def _verdict(sets: RankedSets, stated: Mapping[int, float], kind: str | None) -> Word:
     """The verdict on the best set; kind: of channel in which something unmodelled shows."""
     return decide(
-        VerdictInputs(
-            unknown=float(kind is not None), best=min((stated[i] for i in sets.best.members), default=1.0),
-            alternatives=len(sets.rivals), causes=len(sets.best.members), known_noise=True, confirmed=True,
-        )
+        unknown=float(kind is not None), best=min((stated[i] for i in sets.best.members), default=1.0),
+        causes=len(sets.best.members), alternatives=len(sets.rivals),
     )  # fmt: skip
 
 
@@ -193,15 +191,14 @@ def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[tupl
     def left(f: Fitted) -> float:
         return misfit(total(f.grams), problem.prior, problem.member_columns(f.members))
 
+    def of_their_signs(f: Fitted) -> bool:
+        parameters = [p for i in f.members for p in problem.columns.candidates[i].parameters]
+        return all(p.sign == 0 or t > 0 for t, p in zip(f.theta, parameters, strict=True))
+
     for f in fits:
         if f is best or len(f.members) != len(best.members) or not best.members:
             continue
         behind = 0.5 * (left(f) - left(best))
-        if min(behind, best.log_evidence - f.log_evidence) < EQUAL_LOG_ODDS and _of_their_signs(problem, f):
+        if min(behind, best.log_evidence - f.log_evidence) < EQUAL_LOG_ODDS and of_their_signs(f):
             found.append((best.members, f.members))
     return found
-
-
-def _of_their_signs(problem: Problem, f: Fitted) -> bool:
-    parameters = [p for i in f.members for p in problem.columns.candidates[i].parameters]
-    return all(p.sign == 0 or t > 0 for t, p in zip(f.theta, parameters, strict=True))

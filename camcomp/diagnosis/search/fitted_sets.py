@@ -7,7 +7,7 @@ the search is repeated about the best fit until it is the same again.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from camcomp.diagnosis.statistics.cause_sets import (
     Scale,
     scored,
     total,
-    with_minor,
 )
 from camcomp.diagnosis.statistics.evidence import estimate, freed, log_bayes
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
@@ -115,5 +114,7 @@ class FittedSets:
             less = f
             while small := self.problem.small_members(less):
                 less = self.fit(tuple(i for i in less.members if i not in small))
-            found[less.members] = max(found.get(less.members, less), with_minor(less, f), key=value)
+            minor = tuple(i for i in f.all_members if i not in less.members)
+            more = replace(less, log_evidence=f.log_evidence, minor=minor)
+            found[less.members] = max(found.get(less.members, less), more, key=value)
         return sorted(found.values(), key=value, reverse=True)

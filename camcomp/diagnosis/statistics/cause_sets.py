@@ -4,7 +4,7 @@ The search knows grams, priors and numbers of candidates; what an candidate is, 
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import combinations
 from math import comb, factorial
 
@@ -49,12 +49,6 @@ class Fitted:
     def all_members(self) -> Members:
         """The members and the minor effects fitted with them, to which the evidence belongs."""
         return tuple(sorted((*self.members, *self.minor)))
-
-
-def with_minor(less: Fitted, f: Fitted) -> Fitted:
-    """A set with the evidence of a larger one, whose other members are minor."""
-    minor = tuple(i for i in f.all_members if i not in less.members)
-    return replace(less, log_evidence=f.log_evidence, minor=minor)
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,16 +56,20 @@ def actuators(runs: Sequence[RunGap], names: Sequence[str]) -> dict[str, float]:
     return shares({a: sum(float(np.nansum(r.drives[:, j] ** 2)) for r in runs) for j, a in enumerate(names)})
 
 
-def _energy(run: RunGap) -> Floats:
-    out: Floats = np.nansum(run.gap**2, axis=1)
-    return out
+Part = Sequence[tuple[RunGap, Ints]]  # rows of runs that belong together
+Labelled = tuple[Mapping[str, object], Part]
 
 
-def _chance(run: RunGap, rows: Ints) -> float:
-    """Chance that noise alone makes these rows as large."""
-    normal = run.gap[rows] / run.noise
-    count = np.isfinite(normal).sum() / run.thin
-    return float(chdtrc(max(count, 1.0), np.nansum(normal**2) / run.thin))
+def _energy(part: Part) -> float:
+    """Sum of squares, mm2, of the gap in the rows of a part."""
+    return sum(float(np.nansum(run.gap[rows] ** 2)) for run, rows in part)
+
+
+def _chance(part: Part) -> float:
+    """Chance that noise alone makes a part as large."""
+    normal = [(run.gap[rows] / run.noise, run.thin) for run, rows in part]
+    count = sum(np.isfinite(z).sum() / thin for z, thin in normal)
+    return float(chdtrc(max(count, 1.0), sum(np.nansum(z**2) / thin for z, thin in normal)))
 
 
 def discoveries(chances: Sequence[float]) -> list[bool]:
@@ -80,57 +84,50 @@ def discoveries(chances: Sequence[float]) -> list[bool]:
     return out
 
 
+def _standing_out(parts: Sequence[Labelled]) -> list[Labelled]:
+    """The parts that stand out of the noise."""
+    real = discoveries([_chance(part) for _, part in parts])
+    return [each for each, ok in zip(parts, real, strict=True) if ok]
+
+
+def _largest(runs: Sequence[RunGap], parts: Sequence[Labelled], most: int) -> list[dict[str, object]]:
+    """The labels of the parts with most of the gap's energy, with its share and rms."""
+    whole, out = sum(float(np.nansum(run.gap**2)) for run in runs), []
+    for label, part in sorted(parts, key=lambda each: -_energy(each[1]))[:most]:
+        energy, count = _energy(part), sum(len(rows) for _, rows in part)
+        rms = 1e3 * float(np.sqrt(energy / count))
+        out.append({**label, "share": round(energy / whole, 4), "rms_um": round(rms, 3)})
+    return out
+
+
 def lines(runs: Sequence[RunGap], most: int = 12) -> list[dict[str, object]]:
     """Source lines by share of the gap's energy; only those that stand out of the noise."""
-    whole = sum(float(_energy(r).sum()) for r in runs)
-    found = []
-    for run in runs:
-        for line in np.unique(run.line[np.isfinite(run.line)]):
-            rows = np.flatnonzero(run.line == line)
-            energy = float(_energy(run)[rows].sum())
-            found.append((energy, run, int(line), rows))
-    real = discoveries([_chance(run, rows) for _, run, _, rows in found]) if found else []
-    kept = sorted((f for f, ok in zip(found, real, strict=True) if ok), key=lambda f: -f[0])[:most]
-    return [
-        {
-            "run": run.name,
-            "line": line,
-            "share": round(energy / whole, 4),
-            "rms_um": round(1e3 * float(np.sqrt(energy / len(rows))), 3),
-        }
-        for energy, run, line, rows in kept
+    every: list[Labelled] = [
+        ({"run": run.name, "line": int(line)}, [(run, np.flatnonzero(run.line == line))])
+        for run in runs
+        for line in np.unique(run.line[np.isfinite(run.line)])
     ]
+    return _largest(runs, _standing_out(every), most)
 
 
 def intervals(runs: Sequence[RunGap], most: int = 12) -> list[dict[str, object]]:
     """Stretches of time where the gap stands out of the noise, neighbours joined, by share of its energy."""
-    whole = sum(float(_energy(r).sum()) for r in runs)
-    found = []
-    pieces = []
-    for run in runs:
-        if len(run.time) > 1:
-            bins = np.floor((run.time - run.time[0]) / _BIN_S).astype(int)
-            pieces.append((run, [np.flatnonzero(bins == b) for b in np.unique(bins)]))
-    every = discoveries([_chance(run, rows) for run, groups in pieces for rows in groups]) if pieces else []
-    at = 0
-    for run, groups in pieces:
-        real, at = every[at : at + len(groups)], at + len(groups)
-        open_rows: list[np.ndarray] = []
-        for rows, ok in [*zip(groups, real, strict=True), (np.zeros(0, int), False)]:
-            if ok:
-                open_rows.append(rows)
-            elif open_rows:
-                joined = np.concatenate(open_rows)
-                found.append((float(_energy(run)[joined].sum()), run, joined))
-                open_rows = []
-    found.sort(key=lambda f: -f[0])
-    return [
-        {
-            "run": run.name, "t0_s": round(float(run.time[rows[0]]), 3), "t1_s": round(float(run.time[rows[-1]]), 3),
-            "share": round(energy / whole, 4),
-        }
-        for energy, run, rows in found[:most]
+    bins = [np.floor((run.time - run.time[:1]) / _BIN_S).astype(int) for run in runs]
+    every: list[Labelled] = [
+        ({}, [(run, np.flatnonzero(own == b))]) for run, own in zip(runs, bins, strict=True) for b in np.unique(own)
+    ]
+    joined: list[tuple[RunGap, Ints]] = []
+    for _, [(run, rows)] in _standing_out(every):
+        before, last = joined[-1] if joined else (None, rows)
+        if before is run and last[-1] + 1 == rows[0]:
+            joined[-1] = run, np.concatenate([last, rows])
+        else:
+            joined.append((run, rows))
+    named: list[Labelled] = [
+        ({"run": run.name, "t0_s": round(float(run.time[rows[0]]), 3), "t1_s": round(float(run.time[rows[-1]]), 3)}, [(run, rows)])
+        for run, rows in joined
     ]  # fmt: skip
+    return [{name: v for name, v in each.items() if name != "rms_um"} for each in _largest(runs, named, most)]
 
 
 def travel(runs: Sequence[RunGap], names: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -170,27 +167,11 @@ def places(runs: Sequence[RunGap], most: int = 6) -> list[dict[str, object]]:
     tips = np.concatenate([r.tip for r in runs])
     low, span = tips.min(axis=0), np.ptp(tips, axis=0)
     parts = np.where(span > 1.0, 3, 1)
-    whole = sum(float(_energy(r).sum()) for r in runs)
-    found = []
+    found: list[Labelled] = []
     for cell in np.ndindex(*parts):
-        a = low + span * np.array(cell) / parts
-        b = low + span * (np.array(cell) + 1) / parts
-        energy = rows = 0.0
-        normal = count = 0.0
-        for r in runs:
-            inside = np.flatnonzero(((r.tip >= a - 1e-9) & (r.tip <= b + 1e-9)).all(axis=1))
-            energy += float(_energy(r)[inside].sum())
-            rows += len(inside)
-            z = r.gap[inside] / r.noise
-            normal, count = normal + float(np.nansum(z**2)) / r.thin, count + np.isfinite(z).sum() / r.thin
-        if rows:
-            found.append((energy, rows, a, b, float(chdtrc(max(count, 1.0), normal))))
-    real = discoveries([f[-1] for f in found]) if found else []
-    kept = sorted((f for f, ok in zip(found, real, strict=True) if ok), key=lambda f: -f[0])[:most]
-    return [
-        {
-            **{f"{axis}_mm": [round(float(a[i]), 2), round(float(b[i]), 2)] for i, axis in enumerate("xyz")},
-            "share": round(energy / whole, 4), "rms_um": round(1e3 * float(np.sqrt(energy / rows)), 3),
-        }
-        for energy, rows, a, b, _ in kept
-    ]  # fmt: skip
+        a, b = (low + span * (np.array(cell) + end) / parts for end in (0, 1))
+        inside = [(r, np.flatnonzero(((r.tip >= a - 1e-9) & (r.tip <= b + 1e-9)).all(axis=1))) for r in runs]
+        if any(len(rows) for _, rows in inside):
+            box = {f"{axis}_mm": [round(float(end[i]), 2) for end in (a, b)] for i, axis in enumerate("xyz")}
+            found.append((box, inside))
+    return _largest(runs, _standing_out(found), most)

@@ -3,33 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
 
 
-@dataclass(frozen=True, kw_only=True)
-class Positioning:
-    """Values of an axis: accuracy, repeatability, reversal, systematic deviation of both and of either direction, range of means."""
-
-    A: float
-    A_forward: float
-    A_backward: float
-    R: float
-    R_forward: float
-    R_backward: float
-    B: float
-    B_mean: float
-    E: float
-    E_forward: float
-    E_backward: float
-    M: float
-
-
-def positioning(forward: Sequence[Floats], backward: Sequence[Floats]) -> Positioning:
-    """Values of deviations (measured minus commanded) by target, of two approaches or more from either side.
+def positioning(forward: Sequence[Floats], backward: Sequence[Floats]) -> dict[str, float]:
+    """Values of deviations (measured minus commanded) by target, of two approaches or more from either side: accuracy A,
+    repeatability R and systematic deviation E of both and of either direction, reversal B, range of the means M.
 
     R is the largest of the targets' R_i = max(2 s_forward + 2 s_backward + |B_i|, 4 s_forward, 4 s_backward).
     """
@@ -39,13 +21,13 @@ def positioning(forward: Sequence[Floats], backward: Sequence[Floats]) -> Positi
     both = np.max([2.0 * s_up + 2.0 * s_down + np.abs(reversal), 4.0 * s_up, 4.0 * s_down], axis=0)
     tops, bottoms = (np.stack([up + k * s_up, down + k * s_down]) for k in (2.0, -2.0))
     means = np.stack([up, down])
-    return Positioning(
-        A=float(tops.max() - bottoms.min()), A_forward=float(tops[0].max() - bottoms[0].min()),
-        A_backward=float(tops[1].max() - bottoms[1].min()), R=float(both.max()), R_forward=float(4.0 * s_up.max()),
-        R_backward=float(4.0 * s_down.max()), B=float(np.abs(reversal).max()), B_mean=float(reversal.mean()),
-        E=float(np.ptp(means)), E_forward=float(np.ptp(up)), E_backward=float(np.ptp(down)),
-        M=float(np.ptp(means.mean(axis=0))),
-    )  # fmt: skip
+    return {
+        "A": float(tops.max() - bottoms.min()), "A_forward": float(tops[0].max() - bottoms[0].min()),
+        "A_backward": float(tops[1].max() - bottoms[1].min()), "R": float(both.max()), "R_forward": float(4.0 * s_up.max()),
+        "R_backward": float(4.0 * s_down.max()), "B": float(np.abs(reversal).max()), "B_mean": float(reversal.mean()),
+        "E": float(np.ptp(means)), "E_forward": float(np.ptp(up)), "E_backward": float(np.ptp(down)),
+        "M": float(np.ptp(means.mean(axis=0))),
+    }  # fmt: skip
 
 
 def circular_deviation(points: Sequence[Floats]) -> float:

@@ -43,14 +43,14 @@ TARGETS = np.array([15.0, 25.2, 35.4, 45.6, 55.8])
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_values_of_a_published_test(name):
-    assert getattr(positioning(FORWARD, BACKWARD), name) == pytest.approx(PUBLISHED[name], abs=1.5e-5)
+    assert positioning(FORWARD, BACKWARD)[name] == pytest.approx(PUBLISHED[name], abs=1.5e-5)
 
 
 def test_what_that_report_leaves_out_of_both_directions():
     """R there is the larger of the directions, and E that of one: by the standard they are the largest R(i) = 0.00835 of its own
     table and the range of all means of its tables, 0.00697 + 0.00902."""
     values = positioning(FORWARD, BACKWARD)
-    assert values.R == pytest.approx(0.00835, abs=1.5e-5) and values.E == pytest.approx(0.01599, abs=1.5e-5)
+    assert values["R"] == pytest.approx(0.00835, abs=1.5e-5) and values["E"] == pytest.approx(0.01599, abs=1.5e-5)
 
 
 def test_a_pose_by_hand():

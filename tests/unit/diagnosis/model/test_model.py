@@ -16,7 +16,7 @@ from camcomp.diagnosis.model.explain import KnownNoise, explain
 from camcomp.diagnosis.model.folds import excess_of, folds_of, held_out
 from camcomp.diagnosis.model.group import Group, SmoothProcess
 from camcomp.diagnosis.model.noise import resolution_of
-from camcomp.diagnosis.model.verdict import VerdictInputs, decide
+from camcomp.diagnosis.model.verdict import decide
 from tests.validation.calibration import fit_map
 
 SD = 0.02
@@ -172,7 +172,7 @@ def test_verdicts(more, word):
     own = {
         "unknown": 0.01, "best": 0.95, "alternatives": 0, "causes": 1, "known_noise": True, "confirmed": True,
     }  # fmt: skip
-    assert decide(VerdictInputs(**{**own, **more})) == word
+    assert decide(**{**own, **more}) == word
 
 
 def test_a_family_keeps_to_the_bounds_of_columns_that_nuisances_hide():
