@@ -1,19 +1,18 @@
-"""Which value of a shape (pitch, time constant) explains most of a residual?
+"""Which value of a shape (pitch, time constant) explains most of a residual jointly with all other columns?
 
 The residual has no slope in a shape while its effect is absent, therefore the values of a grid are tried one by one.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, means
-from camcomp.diagnosis.fit.columns import Columns, shape_default
+from camcomp.diagnosis.fit.columns import shape_default
+from camcomp.diagnosis.law.folds import Folds
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import total
-from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS, Gram
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS
+from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Parameter
 
@@ -22,58 +21,18 @@ _AT_ONCE = 8  # values of a shape whose columns are made white together
 White = Callable[[int, ByChannel], ByChannel]  # what makes columns of a run white
 
 
-@dataclass(frozen=True, eq=False)
-class ReducedResidual:
-    """A residual from which other columns are removed by a ridge fit, and the same removal for further columns.
-
-    Residual and candidate columns lose the same part: a warm-up minus its mean is another curve than a warm-up.
-    """
-
-    rest: list[Floats]  # white, per run
-    white: Sequence[ByChannel]
-    others: Ints
-    half: Floats  # (o, o): its square is the inverse of the others' products
-
-    def taken(self, columns: Sequence[ByChannel]) -> Floats:
-        """Part (o, d) of white columns (w, d) per run that the other columns explain, in coordinates that keep the
-        products of columns.
-        """
-        return np.asarray(
-            self.half @ sum((W.T @ C for W, C in zip(self.white, columns, strict=True)), np.zeros(1))[self.others]
-        )
-
-
-def reduced_residual(
-    grams: Sequence[Gram], white: Sequence[ByChannel], residual: Sequence[Floats], columns: Columns, others: Ints
-) -> ReducedResidual:
-    """Residual per run after a ridge fit of the columns `others`."""
-    data = total(grams)
-    precision = np.where(columns.candidate >= 0, 1.0 / 9.0, columns.prior.precision)[others]
-    M = data.A[np.ix_(others, others)] + np.diag(precision)
-    size = 1.0 / np.sqrt(np.diag(M))
-    L = np.linalg.cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(size)))
-    half = np.linalg.solve(L, np.diag(size))
-    a = np.zeros(len(data.b))
-    a[others] = half.T @ (half @ data.b[others])
-    return ReducedResidual([r - W @ a for r, W in zip(residual, white, strict=True)], white, others, half)
-
-
-def best_shape(
-    bench: Bench, candidate: CandidateCause, reduced: ReducedResidual, whitened: White
-) -> dict[str, float] | None:
+def best_shape(bench: Bench, candidate: CandidateCause, base: Folds, whitened: White) -> dict[str, float] | None:
     """The scanned shape whose columns explain most of the residual; None where the effect is not scanned."""
     p = candidate.shapes[0]
     values = np.asarray(p.scan)
     values = np.sort(values[values <= max(longest(bench, candidate, p), values.min())])
-    gains = _gains(
-        bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in values], reduced, whitened
-    )
+    gains = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in values], base, whitened)
     if gains is None:
         return None
     best = int(np.argmax(gains))
     # between its neighbours the gain has one peak, and a large effect off its peak leaves a residual like noise
     near = np.geomspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], _FINER)
-    finer = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in near], reduced, whitened)
+    finer = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in near], base, whitened)
     value = near[int(np.argmax(finer))] if finer is not None and finer.max() > gains[best] else values[best]
     return {**shape_default(candidate), p.name: float(value)}
 
@@ -88,7 +47,7 @@ def longest(bench: Bench, candidate: CandidateCause, p: Parameter) -> float:
 
 
 def _gains(
-    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], reduced: ReducedResidual,
+    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], base: Folds,
     whitened: White,
 ) -> Floats | None:  # fmt: skip
     """Chi-square (v,) that an effect explains with each of v shapes under the prior of its size; None where it is not
@@ -103,17 +62,14 @@ def _gains(
         if columns is None:
             return None
         white = [whitened(k, each) for k, each in enumerate(columns)]
-        lost = reduced.taken(white)
-        products = sum((W.T @ W for W in white), -lost.T @ lost).reshape(len(some), own, len(some), own)
-        each = np.arange(len(some))
-        G = products[each, :, each] + (1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(own)
-        h = sum((W.T @ r for W, r in zip(white, reduced.rest, strict=True)), np.zeros(1)).reshape(-1, own)
+        G, h = base.alone(white, base.products(white, own))
+        G = G + np.eye(own) / PRIOR_WIDTHS[-1] ** 2
         gains.append(np.einsum("vp,vp->v", h, np.linalg.solve(G, h[:, :, None])[:, :, 0]))
     return np.concatenate(gains)
 
 
 def settled_interval(
-    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], reduced: ReducedResidual,
+    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], base: Folds,
     whitened: White,
 ) -> dict[str, float]:  # fmt: skip
     """The interval, near the best candidate interval, whose columns explain most after the removal of the other
@@ -122,14 +78,14 @@ def settled_interval(
     An interval that begins at a reversal resembles play: a residual without all plays shows less of it there.
     """
     paths = [run.run_path for run in bench.runs]
-    every = _gains(bench, candidate, shapes, reduced, whitened)
+    every = _gains(bench, candidate, shapes, base, whitened)
     best, (start, end) = dict(shapes[0 if every is None else int(every.argmax())]), [p.name for p in candidate.shapes]
     run = next((p for p in paths if p.started <= 0.5 * (best[start] + best[end]) <= p.started + p.time[-1]), paths[0])
     row, step, most = float(np.median(np.diff(run.time))), 4, -np.inf
     while step:
         near = [best, *({**best, which: best[which] + sign * step * row} for which in (start, end) for sign in (-1, 1))]
         near = [each for each in near if each[end] - each[start] > 2 * row]
-        gains = _gains(bench, candidate, near, reduced, whitened) if near else None
+        gains = _gains(bench, candidate, near, base, whitened) if near else None
         if gains is None:
             return best
         if gains.max() > most and gains.argmax() > 0:

@@ -16,13 +16,15 @@ from camcomp.diagnosis.fit.columns import (
     shape_default,
 )
 from camcomp.diagnosis.fit.floor import least_noise, measure_floor
-from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, reduced_residual, settled_interval
+from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, settled_interval
 from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.law.folds import Folds, Split
+from camcomp.diagnosis.model.evidence import ABSENT
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
 from camcomp.diagnosis.statistics.cause_sets import total
@@ -103,8 +105,13 @@ def _scanned(problem: Problem) -> Problem:
     """
     scanned = [i for i in problem.shapes if problem.columns.candidates[i].shapes]
     own = [c for i in scanned for c in problem.candidates.columns[i]]
-    others = np.setdiff1d(np.arange(len(problem.columns.names)), own)
-    reduced = reduced_residual(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
+    precision = np.where(problem.columns.candidate >= 0, 1.0 / 9.0, problem.prior.precision)  # three scales
+    precision[own] = ABSENT
+    base = Folds(
+        white=problem.white, residual=problem.white_residual, precision=precision, constants=[], split=Split(1, 1),
+        places=[problem.row_places(k) for k in range(len(problem.white))],
+    )  # fmt: skip
+    rest = base.left()
     changed: list[tuple[list[int], list[list[Floats]]]] = []
     for i in scanned:
         candidate = problem.columns.candidates[i]
@@ -113,10 +120,10 @@ def _scanned(problem: Problem) -> Problem:
             if always is None:
                 continue
             white = [problem.white_columns(k, each) for k, each in enumerate(always)]
-            near = likely_intervals(problem.bench, candidate, white, reduced.rest, problem.row_places)
-            best = settled_interval(problem.bench, candidate, near, reduced, problem.white_columns) if near else None
+            near = likely_intervals(problem.bench, candidate, white, rest, problem.row_places)
+            best = settled_interval(problem.bench, candidate, near, base, problem.white_columns) if near else None
         else:
-            best = best_shape(problem.bench, candidate, reduced, problem.white_columns)
+            best = best_shape(problem.bench, candidate, base, problem.white_columns)
         if best is None:
             continue
         problem.shapes[i] = best

@@ -108,6 +108,11 @@ class Folds:
             for L, b in zip(self._halves, _without_each([b for _, b in self._grams]), strict=True)
         ]
 
+    def left(self) -> list[Floats]:
+        """White residual (w,) per run that the base leaves, fitted to all data."""
+        a = solve_triangular(self._halves[0].T, self._targets[0], lower=False)
+        return [r - W @ a for r, W in zip(self.residual, self.white, strict=True)]
+
     def means(self, more: Sequence[RunColumns], precision: Floats) -> Floats:
         """Coordinates (f, k) of the base, fitted jointly with law columns of that prior precision: with all data, and
         without each part.
