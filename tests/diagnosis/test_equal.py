@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from camcomp.api.diagnosis import diagnose
+from camcomp.diagnosis.model.group import sum_grams
 from camcomp.diagnosis.next_experiment.designed import propose
 from camcomp.diagnosis.search.indistinguishable import classes, likeness
-from camcomp.diagnosis.statistics.cause_sets import total
 from camcomp.diagnosis.statistics.evidence import gram, misfit
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from tests.diagnosis.conftest import plan_of
@@ -94,7 +94,7 @@ def test_rows_of_a_member_in_its_own_direction_are_what_another_one_has_to_fit(w
     )
 
     def behind(theta):
-        data = total([gram(W, W[:, frame] @ theta) for W in problem.white])
+        data = sum_grams([gram(W, W[:, frame] @ theta) for W in problem.white])
         return 0.5 * (misfit(data, problem.prior, tool) - misfit(data, problem.prior, frame))
 
     assert behind(np.array([0.0, 0.0, 1.0, 0.0])) < EQUAL_LOG_ODDS

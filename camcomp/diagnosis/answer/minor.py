@@ -9,7 +9,7 @@ import numpy as np
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.noise import HEALTHY
 from camcomp.diagnosis.result.types import MinorEffect, Outlier
-from camcomp.diagnosis.statistics.cause_sets import Fitted, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 
 MOST_LISTED = 8  # minor effects, or drivers of a gap
@@ -17,7 +17,7 @@ MOST_LISTED = 8  # minor effects, or drivers of a gap
 
 def minor_effects(problem: Problem, f: Fitted) -> tuple[MinorEffect, ...]:
     """Effects of a fit with shrinkage that are no causes, largest first."""
-    mean, _ = estimate(total(f.grams), problem.prior, problem.member_columns(f.members))
+    mean, _ = estimate(f.data, problem.prior, problem.member_columns(f.members))
     found = []
     for i, (candidate, columns) in enumerate(zip(problem.columns.candidates, problem.candidates.columns, strict=True)):
         if i in f.members or not columns:

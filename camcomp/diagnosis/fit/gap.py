@@ -6,7 +6,7 @@ from camcomp.diagnosis.fit.bench import CandidateCause, cause_of
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics import places
-from camcomp.diagnosis.statistics.cause_sets import Fitted, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
@@ -38,7 +38,7 @@ def _label_causes(problem: Problem, f: Fitted) -> list[list[Cause]]:
     found: list[list[Cause]] = [[] for _ in problem.bench.runs]
     if not len(problem.columns.of_labels):
         return found
-    usual = estimate(total(f.grams), problem.prior, problem.member_columns(f.members))[0]
+    usual = estimate(f.data, problem.prior, problem.member_columns(f.members))[0]
     amplitude = dict(zip(problem.columns.names, usual, strict=True))
     for label, effect in EFFECT_OF.items():
         candidate = CandidateCause(effect, None, shelf.load("effects", effect))

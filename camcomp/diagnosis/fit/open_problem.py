@@ -25,9 +25,9 @@ from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.folds import Folds, Split
 from camcomp.diagnosis.model.evidence import ABSENT
+from camcomp.diagnosis.model.group import sum_grams
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
-from camcomp.diagnosis.statistics.cause_sets import total
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
@@ -59,7 +59,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
         )
     )  # fmt: skip
     if len(columns.of_labels):
-        mean = estimate(total(problem.base_grams), problem.prior, ())[0]
+        mean = estimate(sum_grams(problem.base_grams), problem.prior, ())[0]
         problem = replace(problem, columns=with_scatter(columns, bench, mean))
     noise = _with_model_error(problem)
     problem = replace(problem, noise=noise, white=[])  # two sets of white columns at once are much memory
@@ -74,7 +74,7 @@ def _with_model_error(problem: Problem) -> Noise:
     tip shows. The tip keeps the noise of its instrument, and the floor is never touched.
     """
     free = [c for own in problem.candidates.columns for c in own]
-    mean, _ = estimate(total(problem.base_grams), problem.prior, free)
+    mean, _ = estimate(sum_grams(problem.base_grams), problem.prior, free)
     sigma = problem.noise.sigma.copy()
     for k, (W, r) in enumerate(zip(problem.white, problem.white_residual, strict=True)):
         left, at = (r - W @ mean) ** 2, 0

@@ -13,10 +13,11 @@ from camcomp.diagnosis.fit.grid_parameters import longest, reach
 from camcomp.diagnosis.fit.patterns import KINDS, Dictionary
 from camcomp.diagnosis.fit.small_forces import bent_farther
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
+from camcomp.diagnosis.model.group import NormalEquations, sum_grams
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
-from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale
+from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Bools, Floats, Ints
@@ -94,13 +95,9 @@ class Problem:
         return self.columns.prior
 
     @cached_property
-    def base_grams(self) -> tuple[Gram, ...]:
+    def base_grams(self) -> tuple[NormalEquations, ...]:
         """Per run, at nominal."""
-        return self.grams(self.white_residual, self.white)
-
-    def grams(self, residual: Sequence[Floats], white: Sequence[ByChannel]) -> tuple[Gram, ...]:
-        """Per run."""
-        return tuple(gram(D, r) for D, r in zip(white, residual, strict=True))
+        return tuple(gram(D, r) for D, r in zip(self.white, self.white_residual, strict=True))
 
     def whitened(self, k: int, values: Floats) -> Floats:
         """White rows (w, j) of channels (n, c, j) of run k."""
@@ -164,16 +161,14 @@ class Problem:
         shapes = {i: {**self.shapes[i], **laws.get(i, {})} for i in members if i in self.shapes}
         index = self.member_columns(members)
         grams = self.base_grams
-        if not members:
-            return self._without_members()
         if theta is None:
-            theta = estimate(total(grams), self.prior, index)[0][index]
+            theta = estimate(sum_grams(grams), self.prior, index)[0][index]
         theta = self._bounded(members, theta)
         white = [W[:, index] for W in self.white]
         left = list(self.white_residual)
         bent = False
         passes += 1 if shapes else 0
-        far, most = False, passes + FARTHER
+        far, most = False, passes + FARTHER if members else 0
         for step in range(most):
             if step >= passes and not far:
                 break
@@ -181,14 +176,14 @@ class Problem:
             now = [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
             bend = self._bend(now, index, theta)
             if step == 0 and not shapes and bend < STRAIGHT:
-                theta = self._bounded(members, estimate(total(grams), self.prior, index)[0][index])
+                theta = self._bounded(members, estimate(sum_grams(grams), self.prior, index)[0][index])
                 break
             bent = bent or (step == 0 and bend > INDISTINGUISHABLE)
             moved = self._columns_at(members, theta, shapes, readings, bent)
             white = [self._stacked(k, [m[k] for m in moved], index) for k in range(len(self.bench.runs))]
             left = [r + W @ theta for r, W in zip(now, white, strict=True)]
             grams = self._grams_at(index, white, left)
-            mean, full = estimate(total(grams), self.prior, index)
+            mean, full = estimate(sum_grams(grams), self.prior, index)
             after = self._bounded(members, mean[index])
             change, theta = after - theta, after
             size = float(change @ np.linalg.solve(full[np.ix_(index, index)] + 1e-18 * np.eye(len(index)), change))
@@ -204,24 +199,13 @@ class Problem:
         if len(pushed := np.flatnonzero(farther > 1.0)):
             both = [np.column_stack([own, self._pushed(k, farther)]) for k, own in enumerate(white)]
             grams = self._grams_at([*index, *pushed], both, left)
-        scale = Scale(total(grams), self.prior, self.candidates)
-        mean, full = estimate(total(grams), self.prior, index)
+        scale = Scale(sum_grams(grams), self.prior, self.candidates)
+        mean, full = estimate(sum_grams(grams), self.prior, index)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
         return Fitted(
             members=members, theta=theta, covariance=covariance, log_evidence=scale(members), grams=grams,
             extra=shapes, white=tuple(white), residual=tuple(left), farther=farther,
         )  # fmt: skip
-
-    def _without_members(self) -> Fitted:
-        scale = Scale(total(self.base_grams), self.prior, self.candidates)
-        return Fitted(
-            members=(),
-            theta=np.zeros(0),
-            covariance=np.zeros((0, 0)),
-            log_evidence=scale(()),
-            grams=self.base_grams,
-            extra={},
-        )
 
     def white_at(self, f: Fitted) -> list[ByChannel]:
         """White columns (w, k) per run as they are at a fit."""
@@ -269,7 +253,7 @@ class Problem:
         if len(f.grams) == 1 or not members:
             here = np.array([at.index(c) for c in index], int)
             return f.theta[here], np.sqrt(np.diag(f.covariance))[here]
-        mean, covariance = estimate(total(f.grams) - f.grams[k], self.prior, index)
+        mean, covariance = estimate(f.without(k), self.prior, index)
         return self._bounded(members, mean[index]), np.sqrt(np.diag(covariance)[index])
 
     def _stacked(self, k: int, moved: Sequence[Floats | None], index: Sequence[int]) -> Floats:
@@ -280,7 +264,9 @@ class Problem:
             W[:, new] = self.whitened(k, np.stack([m for m in moved if m is not None], axis=2))
         return W
 
-    def _grams_at(self, index: Sequence[int], white: Sequence[Floats], left: Sequence[Floats]) -> tuple[Gram, ...]:
+    def _grams_at(
+        self, index: Sequence[int], white: Sequence[Floats], left: Sequence[Floats]
+    ) -> tuple[NormalEquations, ...]:
         """Normal equations per run, with the columns `index` replaced by white (w, d) and the residual by `left`
         (w,).
         """
@@ -293,7 +279,7 @@ class Problem:
             products[index] = own.T @ both
             cross, b = products[:, :d], products[:, d].copy()
             A[:, index], A[index, :] = cross, cross.T
-            out.append(Gram(A, b, float(r @ r), len(r)))
+            out.append(NormalEquations(A, b, float(r @ r), len(r)))
         return tuple(out)
 
     def _bend(self, now: Sequence[Floats], index: Sequence[int], theta: Floats) -> float:

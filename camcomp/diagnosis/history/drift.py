@@ -8,6 +8,7 @@ Least squares over all divisions by dynamic programming (Jackson et al. 2005).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -75,7 +76,7 @@ def _line(days: Floats, values: Floats, weight: Floats) -> tuple[Course, float]:
     return line, float(np.sum(weight * (values - matrix @ [now, rate]) ** 2))
 
 
-def _steps(values: Floats, weight: Floats) -> list[tuple[list[int], float]]:
+def _steps(values: Floats, weight: Floats) -> list[tuple[tuple[int, ...], float]]:
     """For no, one, two, ... jumps: first rows of the pieces of the best division, and its weighted sum of squared residuals."""
     n, values = len(values), values - np.average(values, weights=weight)
     w, wv, wvv = (np.concatenate(([0.0], np.cumsum(each))) for each in (weight, weight * values, weight * values**2))
@@ -84,20 +85,13 @@ def _steps(values: Floats, weight: Floats) -> list[tuple[list[int], float]]:
         mass = w[b] - w[a]
         return float(max(wvv[b] - wvv[a] - (wv[b] - wv[a]) ** 2 / mass, 0.0))
 
-    best = [[squares(0, b) if b else 0.0 for b in range(n + 1)]]
-    start = [[0] * (n + 1)]
-    out = [([0], best[0][n])]
-    for count in range(1, min(MOST_JUMPS, n - 1) + 1):
-        row, origin = [np.inf] * (n + 1), [0] * (n + 1)
-        for b in range(count + 1, n + 1):
-            choices = [best[-1][a] + squares(a, b) for a in range(count, b)]
-            k = int(np.argmin(choices))
-            row[b], origin[b] = choices[k], count + k
-        best.append(row)
-        start.append(origin)
-        pieces, b = [n], n
-        for level in range(count, 0, -1):
-            b = start[level][b]
-            pieces.append(b)
-        out.append(([0, *reversed(pieces[1:])], row[n]))
-    return out
+    @cache
+    def best(b: int, pieces: int) -> tuple[float, tuple[int, ...]]:
+        """Least sum of squares of the first b values in so many pieces, and the first rows of these."""
+        if pieces == 1:
+            return squares(0, b), (0,)
+        before = ((a, *best(a, pieces - 1)) for a in range(pieces - 1, b))
+        return min((own + squares(a, b), (*starts, a)) for a, own, starts in before)
+
+    each = (best(n, pieces) for pieces in range(1, min(MOST_JUMPS, n - 1) + 2))
+    return [(starts, left) for left, starts in each]

@@ -17,9 +17,9 @@ from camcomp.diagnosis.law.screen import term_grids
 from camcomp.diagnosis.law.smooth import find_map
 from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.result.types import Law
-from camcomp.diagnosis.search.unknown import about, firm_prior
+from camcomp.diagnosis.search.unknown import firm_prior
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, temperature_of, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, temperature_of
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats
 
@@ -114,7 +114,7 @@ def _base(problem: Problem, f: Fitted | None, bench: TermBench, kind: str) -> Ca
     if f is None:
         white, residual, precision = problem.white, problem.white_residual, firm_prior(problem).precision
     else:
-        white, residual = about(problem, f)
+        white, residual = problem.white_at(f), list(f.residual)
         precision, members = problem.prior.precision, problem.member_columns(f.members)
         precision[members] = 1.0 / (10.0 * problem.prior.scale[members]) ** 2
     places = [problem.row_places(k) for k in range(len(residual))]
@@ -185,7 +185,7 @@ def fit_needed(problem: Problem, members: Members) -> Fitted:
     while members:
         f = problem.refit(members)
         smaller = [tuple(each for each in members if each != i) for i in members]
-        scale, prior = Scale(total(f.grams), problem.prior, problem.candidates), problem.candidates.prior
+        scale, prior = Scale(f.data, problem.prior, problem.candidates), problem.candidates.prior
         temperature = temperature_of(f, problem.prior, problem.member_columns(f.members))
         whole = scale(members)
         odds = [(whole - scale(less)) / temperature + prior(members) - prior(less) for less in smaller]

@@ -141,7 +141,7 @@ class NormalEquations:
     b: Floats
     c: float
     rows: int
-    log_size: float
+    log_size: float = 0.0
 
 
 def normal_equations(

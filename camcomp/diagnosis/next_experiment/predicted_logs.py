@@ -20,7 +20,7 @@ from camcomp.diagnosis.model.classes import LARGE
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.search.indistinguishable import HIDDEN
-from camcomp.diagnosis.statistics.cause_sets import Fitted, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.expected_gain import seen_apart
 from camcomp.gcode.interpret import read_program
@@ -60,7 +60,7 @@ class Question:
         out = []
         for f in self.rivals:
             index = self.problem.member_columns(f.members)
-            mean, covariance = estimate(total(f.grams), self.problem.prior, index)
+            mean, covariance = estimate(f.data, self.problem.prior, index)
             mean[index] = 0.0
             covariance[index, index] += (HIDDEN / LARGE * f.theta) ** 2
             out.append((mean, covariance))

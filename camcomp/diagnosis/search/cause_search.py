@@ -21,7 +21,6 @@ from camcomp.diagnosis.statistics.cause_sets import (
     Members,
     probabilities,
     temperature_of,
-    total,
 )
 from camcomp.diagnosis.statistics.evidence import misfit
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
@@ -189,7 +188,7 @@ def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[tupl
     found = []
 
     def left(f: Fitted) -> float:
-        return misfit(total(f.grams), problem.prior, problem.member_columns(f.members))
+        return misfit(f.data, problem.prior, problem.member_columns(f.members))
 
     def of_their_signs(f: Fitted) -> bool:
         parameters = [p for i in f.members for p in problem.columns.candidates[i].parameters]

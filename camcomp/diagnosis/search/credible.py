@@ -24,10 +24,11 @@ from scipy.special import logsumexp
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.discrepancy import UNKNOWN, gains_at_scales
+from camcomp.diagnosis.model.group import NormalEquations
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.search.unknown import joint_products, process_in_time
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, parts_of
-from camcomp.diagnosis.statistics.evidence import Gram, base, holding_back, log_bayes
+from camcomp.diagnosis.statistics.evidence import base, holding_back, log_bayes
 from camcomp.diagnosis.statistics.probability import TEMPERATURE
 from camcomp.diagnosis.statistics.score_test import JointProducts
 from camcomp.ground.datatypes import Floats, Ints
@@ -47,7 +48,11 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool) -> tuple[dict[int,
     joint = joint_products(problem, f, weight)
     alone = _alone(problem, f, joint.data, log(1.0 - UNKNOWN))
     kinds = [_with_covariates(problem, f, joint, alone)]
-    kinds += [_with_process(problem, f, process_in_time(problem, f, weight, power)) for power in (2.0, 1.0)]
+    for power in (2.0, 1.0):
+        scales = process_in_time(problem, f, weight, power)
+        prior = log(UNKNOWN) - log(len(scales))
+        beside = [each for data in scales for each in _alone(problem, f, data, prior)]
+        kinds.append([replace(each, unmodelled=True) for each in beside])
     each_kind = [_present_and_replaced([*kind, *(() if surely else alone)]) for kind in kinds if kind]
     present, replaced = np.min([p for p, _ in each_kind], axis=0), np.max([r for _, r in each_kind], axis=0)
     return dict(zip(members, present.tolist(), strict=True)), dict(zip(members, replaced.tolist(), strict=True))
@@ -71,7 +76,7 @@ class _Hypothesis:
     unmodelled: bool = False
 
 
-def _alone(problem: Problem, f: Fitted, data: Gram, prior: float) -> list[_Hypothesis]:
+def _alone(problem: Problem, f: Fitted, data: NormalEquations, prior: float) -> list[_Hypothesis]:
     """Every part of a set by normal equations; prior: log prior of what these hold beside the set."""
     at, columns = base(data, problem.prior), problem.candidates.columns
     out = []
@@ -81,16 +86,6 @@ def _alone(problem: Problem, f: Fitted, data: Gram, prior: float) -> list[_Hypot
         there = tuple(float(i in some) for i in f.members)
         out.append(_Hypothesis(value, problem.candidates.prior(some) + prior, there))
     return out
-
-
-def _with_process(problem: Problem, f: Fitted, scales: Sequence[tuple[Gram, float]]) -> list[_Hypothesis]:
-    """Every part of a set jointly with a process, by normal equations and log of its size at every scale."""
-    prior = log(UNKNOWN) - log(max(len(scales), 1))
-    return [
-        replace(each, evidence=each.evidence - log_size, unmodelled=True)
-        for data, log_size in scales
-        for each in _alone(problem, f, data, prior)
-    ]
 
 
 def _with_covariates(

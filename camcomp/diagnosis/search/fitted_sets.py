@@ -13,13 +13,13 @@ import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.candidates import PlacedCause
+from camcomp.diagnosis.model.group import sum_grams
 from camcomp.diagnosis.model.search import search_sets
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
     Members,
     Scale,
     scored,
-    total,
 )
 from camcomp.diagnosis.statistics.evidence import estimate, freed, log_bayes
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
@@ -61,7 +61,7 @@ class FittedSets:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        seen = np.diag(total(problem.base_grams).A)
+        seen = np.diag(sum_grams(problem.base_grams).A)
         self.every = [i for i, own in enumerate(problem.candidates.columns) if seen[list(own)].any()]
         self.null = problem.refit(())
         self.done: dict[Members, Fitted] = {(): self.null}
@@ -73,7 +73,7 @@ class FittedSets:
             theta = None
             if near is not None:
                 index = self.problem.member_columns(members)
-                theta = estimate(total(near.grams), self.problem.prior, index)[0][index]
+                theta = estimate(near.data, self.problem.prior, index)[0][index]
             self.done[members] = self.problem.refit(members, theta)
             progress.done(len(self.done) / (3 * TRIED))
         return self.done[members]
@@ -82,7 +82,7 @@ class FittedSets:
         """Fit the best sets by the evidence linearised about a fit; about none, the best single causes, too."""
         self.searched.add(near.members)
         problem = self.problem
-        scale = Scale(total(near.grams), problem.prior, problem.candidates)
+        scale = Scale(near.data, problem.prior, problem.candidates)
         named = zip(problem.columns.candidates, problem.candidates.columns, strict=True)
         places = [PlacedCause(c.name, c.target, own) for c, own in named]
         found = search_sets(LinearSets(scale, self.every, places)).values

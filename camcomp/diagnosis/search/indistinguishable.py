@@ -14,8 +14,8 @@ from scipy.linalg import eigh
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import LARGE
-from camcomp.diagnosis.statistics.cause_sets import total
-from camcomp.diagnosis.statistics.evidence import Base, Gram, base
+from camcomp.diagnosis.model.group import NormalEquations, sum_grams
+from camcomp.diagnosis.statistics.evidence import Base, base
 
 HIDDEN = 0.2  # difference of two effects at that size, in units of the noise, below which they are indistinguishable
 
@@ -26,7 +26,7 @@ class Likeness:
 
     problem: Problem
     within: Base
-    data: Gram
+    data: NormalEquations
 
     def shows(self, i: int) -> bool:
         """Whether the candidate at `LARGE` times its scale moves the channels by their noise."""
@@ -54,7 +54,7 @@ class Likeness:
 
 def likeness(problem: Problem) -> Likeness:
     """The design of a problem."""
-    data = total(problem.base_grams)
+    data = sum_grams(problem.base_grams)
     return Likeness(problem, base(data, problem.prior), data)
 
 

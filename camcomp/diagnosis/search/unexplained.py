@@ -19,7 +19,7 @@ from camcomp.diagnosis.fit.floor import row_scatter
 from camcomp.diagnosis.fit.outliers import TINY
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.statistics.cause_sets import Fitted, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.diagnosis.statistics.shrinkage import SURELY
@@ -67,7 +67,7 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
         theta = np.where(passing | undetermined(theta, doubt, widths), theta, without)
     left = bench.difference(k, bench.read(k, problem.causes(f.members, theta, f.extra)))
     index = problem.member_columns(f.members)
-    usual = estimate(total(f.grams), problem.prior, index)[0]
+    usual = estimate(f.data, problem.prior, index)[0]
     usual[index] = 0.0
     moved = (problem.columns.blocks[k] @ usual).reshape(left.shape[1], -1)
     if f.farther is not None:

@@ -11,9 +11,10 @@ from scipy.linalg import eigh
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SCALES
+from camcomp.diagnosis.model.group import NormalEquations
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
-from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
+from camcomp.diagnosis.statistics.evidence import Prior, estimate
 from camcomp.diagnosis.statistics.score_test import JointProducts, ResidualTest, score_test
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
@@ -29,23 +30,22 @@ def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, Resid
 
 def joint_products(problem: Problem, f: Fitted, weight: Sequence[Floats] | None = None) -> JointProducts:
     """Products of columns, residual and functions of covariates about a fit; weight: of the rows (w,), per run."""
-    white, residual = about(problem, f)
     return JointProducts.of(
-        white, residual, patterns=problem.white_patterns, labels=problem.dictionary.labels, kinds=problem.dictionary.kinds,
-        weight=[np.ones(len(r)) for r in residual] if weight is None else weight,
+        problem.white_at(f), f.residual, patterns=problem.white_patterns, labels=problem.dictionary.labels, kinds=problem.dictionary.kinds,
+        weight=[np.ones(len(r)) for r in f.residual] if weight is None else weight,
     )  # fmt: skip
 
 
-def process_in_time(problem: Problem, f: Fitted, weight: Sequence[Floats], power: float) -> list[tuple[Gram, float]]:
-    """Normal equations about a fit with a process over the time of every run in the first kind of channel, and the log of its
-    size, at every scale of model/discrepancy.
+def process_in_time(problem: Problem, f: Fitted, weight: Sequence[Floats], power: float) -> list[NormalEquations]:
+    """Normal equations about a fit with a process over the time of every run in the first kind of channel, at every scale of
+    model/discrepancy.
 
     weight: of the rows (w,), per run. power: of the distance in the logarithm of the correlation, 2 of a smooth process, 1 of one
     with jumps from row to row.
     """
     k, scales = len(problem.columns.names), len(LENGTHS["time"]) * len(SCALES)
     A, log_size = np.zeros((scales, k + 1, k + 1)), np.zeros(scales)
-    for run, (W, r) in enumerate(zip(*about(problem, f), strict=True)):
+    for run, (W, r) in enumerate(zip(problem.white_at(f), f.residual, strict=True)):
         own, channels = W.appended(r[:, None]).scaled(weight[run]), np.unique(problem.row_cells(run)[0])
         first = sum(problem.kind_of(c) == problem.kind_of(channels[0]) for c in channels)
         _add_process(A, log_size, own.parts[:first], problem.row_places(run), power)
@@ -53,7 +53,7 @@ def process_in_time(problem: Problem, f: Fitted, weight: Sequence[Floats], power
         A += rest.T @ rest
     rows = round(sum(float((w**2).sum()) for w in weight))
     return [
-        (Gram(each[:k, :k], each[:k, k], float(each[k, k]), rows), float(log))
+        NormalEquations(each[:k, :k], each[:k, k], float(each[k, k]), rows, float(log))
         for each, log in zip(A, log_size, strict=True)
     ]
 
@@ -78,13 +78,6 @@ def _add_process(
                     grown = 1.0 + size**2 * np.maximum(spread, 0.0)
                     A[j][np.ix_(on, on)] += turned.T @ (turned / grown[:, None])
                     log_size[j] += 0.5 * float(np.log(grown).sum())
-
-
-def about(problem: Problem, f: Fitted) -> tuple[list[ByChannel], list[Floats]]:
-    """White columns and residual (absolute coordinates) linearised at the fit."""
-    if not f.members:
-        return problem.white, problem.white_residual
-    return problem.white_at(f), list(f.residual)
 
 
 def firm_prior(problem: Problem) -> Prior:
@@ -157,7 +150,7 @@ def _own(problem: Problem, f: Fitted, members: Members, i: int) -> Floats:
     """
     index, at = problem.member_columns((i,)), problem.member_columns(f.members)
     others = problem.member_columns(tuple(each for each in members if each != i))
-    A, signal = total(f.grams).A, np.zeros(len(problem.columns.names))
+    A, signal = f.data.A, np.zeros(len(problem.columns.names))
     signal[index] = f.theta[[at.index(c) for c in index]]
     alone = signal.copy()
     alone[others] -= np.linalg.solve(A[np.ix_(others, others)] + np.eye(len(others)), A[others] @ signal)
@@ -170,9 +163,9 @@ def _left_unseen(problem: Problem, f: Fitted, members: Members) -> Floats:
 
     Beyond what the doubt about the members' amplitudes makes; frames and clocks that are a run's own are fitted to it.
     """
-    index, free, whole, out = problem.member_columns(members), problem.columns.of_labels, total(f.grams), []
-    for g in f.grams:
-        mean, covariance = estimate(whole - g, problem.prior, index)
+    index, free, out = problem.member_columns(members), problem.columns.of_labels, []
+    for k, g in enumerate(f.grams):
+        mean, covariance = estimate(f.without(k), problem.prior, index)
         own = mean[index]
         A, b = g.A[np.ix_(index, index)], g.b[index]
         square = own @ A @ own - 2.0 * b @ own - float(np.sum(A * covariance[np.ix_(index, index)]))

@@ -5,13 +5,14 @@ The search knows grams, priors and numbers of candidates; what an candidate is, 
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import combinations
 from math import comb, factorial
 
 import numpy as np
 
+from camcomp.diagnosis.model.group import NormalEquations, sum_grams
 from camcomp.diagnosis.statistics.evidence import (
-    Gram,
     Prior,
     base,
     holding_back,
@@ -36,7 +37,7 @@ class Fitted:
     theta: Floats
     covariance: Floats
     log_evidence: float
-    grams: tuple[Gram, ...]  # per run, about the fit, in absolute coordinates
+    grams: tuple[NormalEquations, ...]  # per run, about the fit, in absolute coordinates
     extra: Mapping[int, Mapping[str, float]] = field(default_factory=dict)  # scanned shapes by candidate
     white: tuple[Floats, ...] = ()  # per run (w, d), the members' columns at the fit
     residual: tuple[Floats, ...] = ()  # per run (w,), in absolute coordinates
@@ -49,6 +50,15 @@ class Fitted:
     def all_members(self) -> Members:
         """The members and the minor effects fitted with them, to which the evidence belongs."""
         return tuple(sorted((*self.members, *self.minor)))
+
+    @cached_property
+    def data(self) -> NormalEquations:
+        """Of all runs."""
+        return sum_grams(self.grams)
+
+    def without(self, k: int) -> NormalEquations:
+        """Of all runs but one."""
+        return sum_grams([*self.grams[:k], *self.grams[k + 1 :]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,26 +118,17 @@ def parts_of(members: Members) -> list[Members]:
     return [each for size in sizes for each in combinations(members, size)]
 
 
-def total(grams: Sequence[Gram]) -> Gram:
-    """Sum over runs."""
-    out = grams[0]
-    for each in grams[1:]:
-        out = out + each
-    return out
-
-
 def temperature_of(f: Fitted, prior: Prior, index: Sequence[int]) -> float:
     """What log evidence is divided by where a set with columns `index` is the best: no model is as good as its noise, and
     one that leaves more than noise is worth less by as much (quasi-likelihood).
     """
-    data = total(f.grams)
-    return TEMPERATURE * max(1.0, misfit(data, prior, index) / max(data.rows, 1))
+    return TEMPERATURE * max(1.0, misfit(f.data, prior, index) / max(f.data.rows, 1))
 
 
 class Scale:
     """Evidence of sets of candidates for one gram; base: the posterior of no cause."""
 
-    def __init__(self, data: Gram, prior: Prior, candidates: CausePrior) -> None:
+    def __init__(self, data: NormalEquations, prior: Prior, candidates: CausePrior) -> None:
         self.prior, self.candidates = prior, candidates
         self.base = base(data, prior)
 

@@ -24,28 +24,13 @@ import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import log_ndtr, logsumexp
 
+from camcomp.diagnosis.model.group import NormalEquations
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats, Ints
 
 PRIOR_WIDTHS = np.array([0.02, 0.1, 0.5, 2.5])
 _WEIGHTS = np.log([0.2, 0.25, 0.3, 0.25])
 PASSES = 30  # of the search for columns at the end of their reach
-
-
-@dataclass(frozen=True, eq=False)
-class Gram:
-    """White residual and columns: A = D'D (k, k), b = D'r (k,), c = r'r, rows."""
-
-    A: Floats
-    b: Floats
-    c: float
-    rows: int
-
-    def __add__(self, other: "Gram") -> "Gram":
-        return Gram(self.A + other.A, self.b + other.b, self.c + other.c, self.rows + other.rows)
-
-    def __sub__(self, other: "Gram") -> "Gram":
-        return Gram(self.A - other.A, self.b - other.b, self.c - other.c, self.rows - other.rows)
 
 
 def log_sum(values: Sequence[float] | Floats) -> float:
@@ -55,10 +40,10 @@ def log_sum(values: Sequence[float] | Floats) -> float:
     return most + float(np.log(np.exp(v - most).sum())) if np.isfinite(most) else most
 
 
-def gram(D: Floats | ByChannel, r: Floats) -> Gram:
+def gram(D: Floats | ByChannel, r: Floats) -> NormalEquations:
     """From white columns D (w, k) and residual r (w,)."""
     turned: Any = D.T  # of an array or a ByChannel
-    return Gram(turned @ D, turned @ r, float(r @ r), len(r))
+    return NormalEquations(turned @ D, turned @ r, float(r @ r), len(r))
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +65,7 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """No cause at all: posterior of all columns (mean (k,), covariance (k, k)) and log evidence."""
+    """Posterior of all columns: mean (k,), covariance (k, k) and log evidence under a prior precision (k,)."""
 
     mean: Floats
     covariance: Floats
@@ -88,15 +73,15 @@ class Base:
     log_evidence: float
 
 
-def base(data: Gram, prior: Prior) -> Base:
-    """Posterior with every column within its tolerance."""
-    precision = prior.precision
+def base(data: NormalEquations, prior: Prior, members: Sequence[int] = ()) -> Base:
+    """Posterior with the columns `members` free within 10 scales, and every other one within its tolerance."""
+    precision = estimate_precision(prior, members)
     # scaled so that the factorisation does not mix mm with ppm
     size = 1.0 / np.sqrt(np.diag(data.A) + precision)
     scaled = size[:, None] * data.A * size + np.diag(precision * size**2)
     covariance, log_det = _inverse(scaled, size)
     mean = covariance @ data.b
-    evidence = -0.5 * (data.c - float(data.b @ mean)) - 0.5 * (log_det - np.log(precision).sum())
+    evidence = -0.5 * (data.c - float(data.b @ mean)) - 0.5 * (log_det - np.log(precision).sum()) - data.log_size
     return Base(mean, covariance, precision, evidence)
 
 
@@ -156,16 +141,13 @@ def _choices(count: int, widths: int) -> Ints:
     return np.array(list(product(range(widths), repeat=count)))
 
 
-def estimate(data: Gram, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
+def estimate(data: NormalEquations, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
     """Mode (k,) and covariance (k, k) with the columns `members` free within 10 scales, the others within tolerance and reach.
 
     The covariance is that without the ends of the reaches: never too small.
     """
-    precision = estimate_precision(prior, members)
-    size = 1.0 / np.sqrt(np.diag(data.A) + precision)
-    scaled = size[:, None] * data.A * size + np.diag(precision * size**2)
-    covariance, _ = _inverse(scaled, size)
-    return within(covariance @ data.b, lambda held: covariance[:, held], _reach(prior, members))[0], covariance
+    at = base(data, prior, members)
+    return within(at.mean, lambda held: at.covariance[:, held], _reach(prior, members))[0], at.covariance
 
 
 def estimate_precision(prior: Prior, members: Sequence[int]) -> Floats:
@@ -199,7 +181,7 @@ def holding_back(at: Base, prior: Prior, members: Sequence[int]) -> float:
     return within(mean, lambda held: at.covariance[:, held] - own @ (gain @ own[held].T), _reach(prior, index))[1]
 
 
-def misfit(data: Gram, prior: Prior, members: Sequence[int]) -> float:
+def misfit(data: NormalEquations, prior: Prior, members: Sequence[int]) -> float:
     """Minimum chi-square with the columns `members` free and all others within tolerance, penalties included."""
     mean, _ = estimate(data, prior, members)
     precision = prior.precision

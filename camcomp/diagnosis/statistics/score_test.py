@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
+from camcomp.diagnosis.model.group import NormalEquations
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate_precision
+from camcomp.diagnosis.statistics.evidence import Prior, estimate_precision
 from camcomp.ground.datatypes import Floats, Ints
 
 
@@ -35,7 +36,7 @@ class JointProducts:
     rows: number of white rows, each with the square of its weight.
     """
 
-    data: Gram
+    data: NormalEquations
     B: Floats
     h: Floats
     P: Floats
@@ -55,7 +56,7 @@ class JointProducts:
             whole += own.T @ own
         rows = float(sum((w**2).sum() for w in weight))
         return JointProducts(
-            data=Gram(whole[:k, :k], whole[:k, -1], float(whole[-1, -1]), round(rows)), B=whole[:k, k:-1], h=whole[k:-1, -1],
+            data=NormalEquations(whole[:k, :k], whole[:k, -1], float(whole[-1, -1]), round(rows)), B=whole[:k, k:-1], h=whole[k:-1, -1],
             P=whole[k:-1, k:-1], labels=tuple(labels), kinds=tuple(kinds), rows=rows,
         )  # fmt: skip
 

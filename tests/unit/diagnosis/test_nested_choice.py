@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.answer.nested import causes_without
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Scale, probabilities, total
+from camcomp.diagnosis.model.group import sum_grams
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Scale, probabilities
 from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
 
 
@@ -18,7 +19,7 @@ class Told(SimpleNamespace):
         return list(members)
 
     def theta_without(self, f, k, members):
-        others = total(f.grams) - f.grams[k]
+        others = f.without(k)
         return estimate(others, self.prior, list(members))[0][list(members)]
 
     def causes(self, members, theta, shapes):
@@ -43,10 +44,10 @@ def experiment(sizes, weights, *, only_last=False):
         candidates=CausePrior(((0,), (1,), (2,)), np.log(weights), lambda i, j: False),
         bench=SimpleNamespace(runs=[None] * 3),
     )
-    scale = Scale(total(runs), prior, problem.candidates)
+    scale = Scale(sum_grams(runs), prior, problem.candidates)
 
     def fit(members):
-        theta = estimate(total(runs), prior, list(members))[0][list(members)]
+        theta = estimate(sum_grams(runs), prior, list(members))[0][list(members)]
         return Fitted(
             members=members,
             theta=theta,

@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.model.group import NormalEquations
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.evidence import Gram, Prior
+from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.diagnosis.statistics.score_test import JointProducts, score_test
 
 
 def test_a_pattern_given_twice_counts_once():
     def energy(n):
         P, names = np.full((n, n), 50.0), tuple("ab"[:n])
-        data = Gram(np.zeros((0, 0)), np.zeros(0), 0.0, 1000)
+        data = NormalEquations(np.zeros((0, 0)), np.zeros(0), 0.0, 1000)
         joint = JointProducts(
             data=data, B=np.zeros((0, n)), h=np.full(n, 40.0), P=P, labels=names, kinds=("tip",) * n, rows=1000.0
         )
