@@ -121,7 +121,7 @@ class ExperimentDiagnosis:
         """
         proposal = self.result.next_experiment
         if proposal is not None and proposal.poses is not None:
-            from camcomp.diagnosis.next_experiment.pose_list import pose_list
+            from camcomp.diagnosis.arm.next_poses import pose_list
             from camcomp.model.statics.build import build_robot
 
             config = self.file.config

@@ -11,7 +11,7 @@ import numpy as np
 
 from camcomp.diagnosis.answer.held_out import shrinkage_of
 from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, run_gaps
-from camcomp.diagnosis.answer.minor import MOST_LISTED, minor_effects, outlying_rows
+from camcomp.diagnosis.answer.minor import MOST_LISTED, minor_effects
 from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.answer.stretch import with_stretches
 from camcomp.diagnosis.fit.bench import Bench, Run
@@ -39,6 +39,7 @@ from camcomp.diagnosis.result.types import (
     GapSize,
     NamedCause,
     NextExperiment,
+    Outlier,
     UnknownCause,
     UnseenShrinkage,
     Where,
@@ -106,13 +107,17 @@ def diagnose(
     )
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
+    outliers = tuple(
+        Outlier(run=run.name, row=int(row) + 1)
+        for run, cells in zip(problem.bench.runs, problem.outliers, strict=True) for row in np.flatnonzero(cells.any(axis=1))
+    )  # fmt: skip
     result = within_floor(DiagnosisResult(
         verdict=word, gap=gap, where=_where(problem, found, best, law),
         causes=_causes(stands, found, best, law),
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
         shrinkage=shrinkage if unseen else None,
         next_experiment=_proposed(proposal) if proposal is not None else None, minor=minor_effects(stands, best),
-        outliers=outlying_rows(problem), floor=Floor(um=gap.noise_floor_um, source=problem.floor.source),
+        outliers=outliers, floor=Floor(um=gap.noise_floor_um, source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
         standards=of_runs(twin, runs),
     ))  # fmt: skip

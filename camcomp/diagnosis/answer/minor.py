@@ -1,14 +1,10 @@
-"""Which fitted effects and rows does the answer list apart from the causes: effects below MINOR, and outliers of the
-logs?
-"""
+"""Effects of a fit with shrinkage that are listed apart from the causes, because they are below MINOR."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.noise import HEALTHY
-from camcomp.diagnosis.result.types import MinorEffect, Outlier
+from camcomp.diagnosis.result.types import MinorEffect
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 
@@ -27,12 +23,3 @@ def minor_effects(problem: Problem, f: Fitted) -> tuple[MinorEffect, ...]:
         if size > HEALTHY * problem.floor.tip_um:
             found.append(MinorEffect(effect=candidate.name, target=candidate.target, size_um=round(size, 3)))
     return tuple(sorted(found, key=lambda each: -each.size_um)[:MOST_LISTED])
-
-
-def outlying_rows(problem: Problem) -> tuple[Outlier, ...]:
-    """Rows of the logs, counted from 1, with at least one cell that was excluded as an outlier."""
-    return tuple(
-        Outlier(run=run.name, row=int(row) + 1)
-        for run, cells in zip(problem.bench.runs, problem.outliers, strict=True)
-        for row in np.flatnonzero(cells.any(axis=1))
-    )

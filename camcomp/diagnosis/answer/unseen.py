@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
 from camcomp.diagnosis.result.types import ShrinkageStep, UnseenShrinkage
-from camcomp.diagnosis.statistics.shrinkage import log_ratio, of_one_more, scatter
+from camcomp.diagnosis.statistics.probability import SURELY
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 PARTS_OF_ONE = 4  # that a run visits, at least: it differs from the next one by as much as means of these
@@ -39,7 +40,8 @@ class JudgedRun:
     @property
     def log_ratio(self) -> float:
         """Logarithm of the ratio of the rms without and with all causes."""
-        return log_ratio(float(self.squares[0].mean()), float(self.squares[-1].mean()))
+        before, after = (max(float(each.mean()), 1e-300) for each in (self.squares[0], self.squares[-1]))
+        return 0.5 * float(np.log(after / before))
 
 
 def unseen_shrinkage(
@@ -79,3 +81,19 @@ def interval_of_next(runs: Sequence[JudgedRun]) -> tuple[float, float]:
             square, freedom = square + inside / PARTS_OF_ONE, freedom + parts
     low, high = of_one_more(float(each.mean()), square, freedom, 1.0 + 1.0 / len(each))
     return max(low, min(0.0, 1.0 - float(np.exp(each.max())))), high
+
+
+def scatter(each: Floats) -> tuple[float, int]:
+    """Sum of squares about the mean of values (n,), and its degrees of freedom."""
+    return float(((each - each.mean()) ** 2).sum()), len(each) - 1
+
+
+def of_one_more(middle: float, square: float, freedom: float, more: float) -> tuple[float, float]:
+    """95 % interval of the shrinkage (1 less the ratio) of one more. Student's t.
+
+    middle: of the logarithms; square, freedom: what they scatter by; more: variance of one more beside that mean, in
+    variances of one.
+    """
+    freedom = max(freedom, 1)
+    half = float(student.ppf(SURELY, freedom)) * float(np.sqrt(square / freedom * more))
+    return 1.0 - float(np.exp(middle + half)), 1.0 - float(np.exp(middle - half))

@@ -101,7 +101,20 @@ class PoseCase:
     @cached_property
     def parts(self) -> list[PlacedEffect]:
         """Members of the most probable set, and the targets of its families."""
-        return parts_of(self)
+        found, columns = self.explanation, self.shelf.columns
+        own = [PlacedEffect(c.effect, c.target, list(c.columns), found.places[c.place])
+               for c in (found.model.candidates[i] for i in found.members)]  # fmt: skip
+        for name, _ in found.background.families:
+            on = [j for j in found.model.family(name)[0].tolist() if self.amount[j] != 0.0]
+            for target in dict.fromkeys(columns[j].target for j in on):
+                here = [j for j in on if columns[j].target == target]
+                alone = next((p for p in own if (p.effect, p.target) == (name, target)), None)
+                if alone is None:
+                    chance = float(expit(found.odds_of(here)))
+                    own.append(PlacedEffect(name, target, here, found.families[name] * chance))
+                else:
+                    alone.columns.extend(j for j in here if j not in alone.columns)
+        return own
 
     def alternatives(self) -> list[tuple[int, ...]]:
         """Sets that are indistinguishable by these poses, the best first."""
@@ -110,24 +123,6 @@ class PoseCase:
     def places(self, members: Sequence[int]) -> list[Place]:
         """Effects and targets of candidates."""
         return [self.shelf.candidates[i].place for i in members]
-
-
-def parts_of(case: PoseCase) -> list[PlacedEffect]:
-    """Members of the most probable set, and the targets of its families."""
-    found, columns = case.explanation, case.shelf.columns
-    own = [PlacedEffect(c.effect, c.target, list(c.columns), found.places[c.place])
-           for c in (found.model.candidates[i] for i in found.members)]  # fmt: skip
-    for name, _ in found.background.families:
-        on = [j for j in found.model.family(name)[0].tolist() if case.amount[j] != 0.0]
-        for target in dict.fromkeys(columns[j].target for j in on):
-            here = [j for j in on if columns[j].target == target]
-            alone = next((p for p in own if (p.effect, p.target) == (name, target)), None)
-            if alone is None:
-                chance = float(expit(found.odds_of(here)))
-                own.append(PlacedEffect(name, target, here, found.families[name] * chance))
-            else:
-                alone.columns.extend(j for j in here if j not in alone.columns)
-    return own
 
 
 def named_rows(poses: Poses, mask: np.ndarray) -> list[tuple[str, int]]:

@@ -29,8 +29,7 @@ from camcomp.diagnosis.model.explain import STATED, Explanation, KnownNoise, exp
 from camcomp.diagnosis.model.noise import StatedDeviation, rounding_noise
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, GapSize, Outlier
-from camcomp.diagnosis.statistics.probability import EVEN, SEED
-from camcomp.diagnosis.statistics.shrinkage import SURELY
+from camcomp.diagnosis.statistics.probability import EVEN, SEED, SURELY
 from camcomp.ground import progress
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
@@ -271,7 +270,7 @@ def studied(
     bench = case.bench
     case = without_far_judged(case)
     unseen = unseen_poses(case)
-    case = replace(case, check=check_held_out(case, unseen))
+    case = replace(case, check=check_held_out(case, unseen[0]))
     progress.done(0.8)
     named, minor = answer.causes(case)
     word = answer.verdict(case, named)

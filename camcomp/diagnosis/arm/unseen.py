@@ -7,7 +7,7 @@ is judged has the frames of its clamping where fitted poses fix them; otherwise 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from camcomp.diagnosis.arm.poses import CURVE, LEAST_POSES, ArmBench
 from camcomp.diagnosis.model.evidence import Background, LinearModel
 from camcomp.diagnosis.model.folds import REGIONS, Excess, excess_of, folds_of, held_out
 from camcomp.diagnosis.model.group import Group, split_regions
-from camcomp.diagnosis.model.search import MOST, search_sets
+from camcomp.diagnosis.model.search import MOST, best_of, search_sets
 from camcomp.diagnosis.result.types import FoundCause, UnknownCause, UnseenShrinkage
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats, Ints
@@ -28,12 +28,7 @@ from camcomp.model.effect import Cause
 FAR_FRAME = 5.0  # contract: floors from which on withheld poses in fitted frames are warned of
 
 
-@dataclass(frozen=True, eq=False)
-class UnseenPoses:
-    """The model with one group per unit that is left out; of every such unit the campaign and its rows."""
-
-    model: LinearModel
-    units: list[tuple[int, Ints]]
+UnseenPoses = tuple[LinearModel, list[tuple[int, Ints]]]  # one group per unit that is left out; its campaign and rows
 
 
 def unseen_poses(case: PoseCase) -> UnseenPoses:
@@ -41,22 +36,22 @@ def unseen_poses(case: PoseCase) -> UnseenPoses:
     bench, groups = case.bench, case.model.groups
     if len(bench.own) < len(bench.campaigns):
         judged = range(len(bench.own), len(bench.campaigns))
-        return UnseenPoses(case.model, [(k, np.arange(len(groups[k].y))) for k in judged])
+        return case.model, [(k, np.arange(len(groups[k].y))) for k in judged]
     units = []
     for k, poses in enumerate(bench.campaigns):
         names = np.unique(poses.run, return_inverse=True)[1]
         units += [(k, np.flatnonzero(names == i)) for i in np.unique(names)]
-    return UnseenPoses(replace(case.model, groups=tuple(groups[k].take(rows) for k, rows in units), fitted=None), units)
+    return replace(case.model, groups=tuple(groups[k].take(rows) for k, rows in units), fitted=None), units
 
 
-def check_held_out(case: PoseCase, unseen: UnseenPoses) -> Excess | None:
+def check_held_out(case: PoseCase, model: LinearModel) -> Excess | None:
     """Excess of held-out poses with the causes, under the noise of the floor alone; None without either of them."""
-    pairs = folds_of(unseen.model)
+    pairs = folds_of(model)
     if case.floor is None or not all(others for _, others in pairs):
         return None
     found = case.explanation
     background = Background(families=found.background.families)
-    return excess_of(unseen.model, held_out(unseen.model, background, found.members, pairs), case.floor.freedom)
+    return excess_of(model, held_out(model, background, found.members, pairs), case.floor.freedom)
 
 
 def without_far_judged(case: PoseCase) -> PoseCase:
@@ -109,21 +104,21 @@ def shrinkage(
     case: PoseCase, unseen: UnseenPoses, named: Sequence[FoundCause], names: Sequence[str], withheld: bool
 ) -> UnseenShrinkage | None:
     """Shrinkage of withheld campaigns, else of every run by causes fitted to the others; None where one run is all."""
-    bench = case.bench
+    bench, (model, units) = case.bench, unseen
     known = [c for c in named if not isinstance(c, UnknownCause)]
-    if not unseen.units or (not withheld and len(case.runs) == 1):
+    if not units or (not withheld and len(case.runs) == 1):
         return None
     if withheld:
-        stages = [[bench.gap(k, acting(known[:i])) for i in range(len(known) + 1)] for k, _ in unseen.units]
+        stages = [[bench.gap(k, acting(known[:i])) for i in range(len(known) + 1)] for k, _ in units]
         order = [(c.effect, c.target) for c in known]
-        refitted = any(bench.owner[k] == k for k, _ in unseen.units)
+        refitted = any(bench.owner[k] == k for k, _ in units)
     else:
-        stages, order, refitted = left_out_in_turn(unseen.model, case.explanation.background)
+        stages, order, refitted = left_out_in_turn(model, case.explanation.background)
     runs = []
-    for (k, rows), each in zip(unseen.units, stages, strict=True):
+    for (k, rows), each in zip(units, stages, strict=True):
         parts = split_regions(bench.features(bench.campaigns[k])[rows], min(REGIONS, max(len(rows) // 8, 2)))
         runs.append(JudgedRun([(r**2).sum(axis=1) for r in each], parts))
-    share, rest = where_covered(case, named, unseen.units, [r.squares[-1] for r in runs])
+    share, rest = where_covered(case, named, units, [r.squares[-1] for r in runs])
     texts = ["frame of the instrument", "place of its target"] if refitted else []
     texts += [f"run {name} does not fix its frame: not judged" for name in case.loose]
     return unseen_shrinkage(
@@ -143,7 +138,7 @@ def left_out_in_turn(
     refitted = False
     for g, others in folds_of(model):
         less = replace(model, fitted=others)
-        members = search_sets(less.reduced(background), MOST).best
+        members = best_of(search_sets(less.reduced(background), MOST))
         at = less.posterior(background, less.reduced(background).slab(members))
         own = {model.candidates[i].place: list(model.candidates[i].columns) for i in members}
         own |= {(name, None): less.family(name)[0].tolist() for name, _ in background.families}

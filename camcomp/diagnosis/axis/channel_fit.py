@@ -275,7 +275,7 @@ def _explained(
         floors=sd / data.floor,
     )
     data_of = model.reduced(Background())
-    values = search_sets(data_of, CAUSES).values if on is None else {on: max(data_of.value(on), -1e300)}
+    values = search_sets(data_of, CAUSES) if on is None else {on: max(data_of.value(on), -1e300)}
     return _Linear(model, posterior_of(model, {Background(): values}), unit)
 
 

@@ -4,9 +4,10 @@ Columns are in units of their own scale, so that priors read the same for all of
 tolerance what every healthy machine has of it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -274,44 +275,34 @@ def _allowances(bench: Bench) -> list[Nuisance]:
     force.
     """
     found: list[Nuisance] = []
-    edits: list[tuple[str, Callable[[Robot], Robot]]] = []
-    for chain in bench.twin.robot.chains:
-        if any(isinstance(e, Link) for e in chain.elements):
-            edits.append((f"links.{chain.name}", partial(_stiffer_links, chain=chain.name)))
-        if any(isinstance(e, Parallelogram) for e in chain.elements):
-            edits.append((f"bars.{chain.name}", partial(_stiffer_bars, chain=chain.name)))
-    if len(edits) <= 12:
-        for label, edit in edits:
-            found.append(
-                (f"spring.{label}", SPRING_LOG, _difference(bench, f"spring.{label}", _Edit(edit), SHARE_OF_SCALE))
-            )
+    springs = [
+        (f"spring.{label}.{chain.name}", SPRING_LOG, _Stiffer(chain.name, part, spring))
+        for chain in bench.twin.robot.chains
+        for label, part, spring in (("links", Link, "stiffness"), ("bars", Parallelogram, "bar_stiffness"))
+        if any(isinstance(e, part) for e in chain.elements)
+    ]
+    allowed: list[tuple[str, float, object]] = [*springs] if len(springs) <= 12 else []
     if any(np.abs(run.run_path.node_force).max(initial=0.0) > 0 for run in bench.runs):
-        found.append(
-            ("force.direction", FORCE_TURN_RAD, _difference(bench, "force.direction", _Turn(), SHARE_OF_SCALE))
-        )
+        allowed.append(("force.direction", FORCE_TURN_RAD, _Turn()))
+    for name, size, effect in allowed:
+        causes = [Cause(name, effect, None, {})]  # the name tells one changed machine from another
+        changes = [bench.change(k, bench.read(k, causes), bench.nominal[k]) for k in range(len(bench.runs))]
+        found.append((name, size, [change / SHARE_OF_SCALE for change in changes]))
     return found
 
 
-def _stiffer_links(robot: Robot, chain: str) -> Robot:
-    f = float(np.exp(SHARE_OF_SCALE))
-    return robot.edit(Link, lambda e: replace(e, stiffness=e.stiffness * f), chain)
+@dataclass(frozen=True)
+class _Stiffer:
+    """The springs of one kind of part of a chain stiffer by SHARE_OF_SCALE of their logarithm."""
 
-
-def _stiffer_bars(robot: Robot, chain: str) -> Robot:
-    f = float(np.exp(SHARE_OF_SCALE))
-    return robot.edit(Parallelogram, lambda e: replace(e, bar_stiffness=e.bar_stiffness * f), chain)
-
-
-class _Edit:
-    """An on_robot hook around a function."""
-
-    PARAMETERS = ()
-
-    def __init__(self, change: Callable[[Robot], Robot]) -> None:
-        self.change = change
+    chain: str
+    part: Any
+    spring: str
+    PARAMETERS: ClassVar[tuple[Parameter, ...]] = ()
 
     def on_robot(self, robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -> Robot:
-        return self.change(robot)
+        f = float(np.exp(SHARE_OF_SCALE))
+        return robot.edit(self.part, lambda e: replace(e, **{self.spring: f * getattr(e, self.spring)}), self.chain)
 
 
 class _Turn:
@@ -322,14 +313,6 @@ class _Turn:
     def on_load(self, load: Load, motion: object, p: Mapping[str, float]) -> Load:
         c, s = np.cos(SHARE_OF_SCALE), np.sin(SHARE_OF_SCALE)
         return Load(load.force @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), load.wrench)
-
-
-def _difference(bench: Bench, name: str, effect: object, step: float) -> list[Floats]:
-    cause = Cause(name, effect, None, {})  # the name tells one changed machine from another
-    out = []
-    for k in range(len(bench.runs)):
-        out.append(bench.change(k, bench.read(k, [cause]), bench.nominal[k]) / step)
-    return out
 
 
 def grounds(bench: Bench) -> list[Ground]:

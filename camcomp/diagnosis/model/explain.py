@@ -27,7 +27,7 @@ from camcomp.diagnosis.model.discrepancy import (
     residuals,
 )
 from camcomp.diagnosis.model.evidence import Background, LinearModel, Members, Reduced
-from camcomp.diagnosis.model.search import MOST, ROUNDS, Visited, search_sets
+from camcomp.diagnosis.model.search import MOST, ROUNDS, best_of, search_sets
 from camcomp.ground.datatypes import Floats
 
 STATED = 0.08  # log deviation of a stated noise: instruments know themselves to an eighth in the square
@@ -119,10 +119,10 @@ def explain(
     """Sets of causes and the model discrepancy, from all fitted groups; start: a background to begin with."""
     weighed: dict[Background, dict[Members, float]] = {}
 
-    def search_beside(background: Background) -> Visited:
+    def search_beside(background: Background) -> dict[Members, float]:
         found = search_sets(model.reduced(background), most)
         prior = log_prior(model, background, noise)
-        weighed[background] = {m: v + prior for m, v in found.values.items()}
+        weighed[background] = {m: v + prior for m, v in found.items()}
         return found
 
     background = best_noise(model, Background(), {}, None) if noise is None else Background()
@@ -151,7 +151,7 @@ def log_prior(model: LinearModel, background: Background, noise: KnownNoise | No
 
 
 def further_backgrounds(
-    model: LinearModel, background: Background, found: Visited, noise: KnownNoise | None
+    model: LinearModel, background: Background, found: Mapping[Members, float], noise: KnownNoise | None
 ) -> dict[Background, tuple[Members, float]]:
     """Backgrounds with one discrepancy more, each with the set of `found` that goes best with it and its log posterior.
 
@@ -165,14 +165,14 @@ def further_backgrounds(
         if b not in out or value > out[b][1]:
             out[b] = members, value
 
-    parts = parts_of(data, found.best)
+    parts = parts_of(data, best_of(found))
     for members in parts:
-        here = found.values.get(members, data.value(members)) + prior
+        here = found.get(members, data.value(members)) + prior
         for b, gain in gains_of_more(model, background, members).items():
             consider(b, members, here + gain)
     for members in dict.fromkeys((parts[0], parts[-1])):
         slab = data.slab(members)
-        here = found.values.get(members, data.value(members)) - model.log_evidence(background, slab)
+        here = found.get(members, data.value(members)) - model.log_evidence(background, slab)
         others = [best_noise(model, background, slab, noise)]
         if background.process is None and (members == parts[0] or not background.scales):
             left = residuals(model, background, members)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -18,16 +17,9 @@ KEPT = 12  # sets of each size that are enlarged
 SLACK = 6.0  # log posterior by which the best set of a size may lie behind, and be enlarged
 
 
-@dataclass(frozen=True, eq=False)
-class Visited:
-    """Sets that a search has weighed, with their log posteriors; best: the most probable."""
-
-    values: dict[Members, float]
-
-    @property
-    def best(self) -> Members:
-        """The most probable set."""
-        return max(self.values, key=lambda m: (self.values[m], m))
+def best_of(values: Mapping[Members, float]) -> Members:
+    """The most probable of sets with their log posteriors."""
+    return max(values, key=lambda m: (values[m], m))
 
 
 class WeighedSets(Protocol):
@@ -48,7 +40,7 @@ class WeighedSets(Protocol):
         """Log posterior (m,) of a set with one of `more` each."""
 
 
-def search_sets(data: WeighedSets, most: int = MOST) -> Visited:
+def search_sets(data: WeighedSets, most: int = MOST) -> dict[Members, float]:
     """Sets of up to `most` causes with their log posteriors.
 
     A set has at most one candidate of more than LONG columns, which is tried with the best set of each size.
@@ -79,11 +71,11 @@ def search_sets(data: WeighedSets, most: int = MOST) -> Visited:
         if not front or (size > 1 and values[front[0]] < max(values.values()) - SLACK):
             break
     best = None
-    while best != (best := Visited(values).best):
+    while best != (best := best_of(values)):
         leaders.add(best)
         for k in range(len(best)):
             less = (*best[:k], *best[k + 1 :])
             if less not in values:
                 values[less] = data.value(less)
             enlarge(less)
-    return Visited({m: v for m, v in values.items() if np.isfinite(v)})
+    return {m: v for m, v in values.items() if np.isfinite(v)}

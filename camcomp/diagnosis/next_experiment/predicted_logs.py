@@ -19,10 +19,10 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import LARGE
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.next_experiment.candidates import Candidate
+from camcomp.diagnosis.next_experiment.information_gain import seen_apart
 from camcomp.diagnosis.search.indistinguishable import HIDDEN
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
-from camcomp.diagnosis.statistics.expected_gain import seen_apart
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import CamcompError

@@ -85,7 +85,7 @@ class FittedSets:
         scale = Scale(near.data, problem.prior, problem.candidates)
         named = zip(problem.columns.candidates, problem.candidates.columns, strict=True)
         places = [PlacedCause(c.name, c.target, own) for c, own in named]
-        found = search_sets(LinearSets(scale, self.every, places)).values
+        found = search_sets(LinearSets(scale, self.every, places))
         larger = {members for members in found if len(members) > len(near.members)}
         for some in (larger, found.keys() - larger - self.done.keys()):
             first = sorted(some, key=lambda members: (-found[members], members))[: 3 * TRIED]

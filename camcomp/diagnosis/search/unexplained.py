@@ -22,7 +22,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import BLOCK
-from camcomp.diagnosis.statistics.shrinkage import SURELY
+from camcomp.diagnosis.statistics.probability import SURELY
 from camcomp.ground.datatypes import Bools, Floats
 
 SURE_Z = 5.0  # standard deviations of chance

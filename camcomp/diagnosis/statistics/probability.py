@@ -4,6 +4,7 @@ from math import exp, log
 
 EVEN = 0.5  # of an effect, before the data are looked at
 PLACES = 4
+SURELY = 0.975  # both ends of 95 %
 SEED = 20200714  # of all draws: the same answer twice
 EQUAL_LOG_ODDS = 3.0  # odds of 20, Kass and Raftery 1995: sets closer than that are not told apart
 TEMPERATURE = 1.5  # divides log evidence before it becomes a probability, where the model is as good as its noise

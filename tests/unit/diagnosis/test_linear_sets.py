@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.model.candidates import PlacedCause
-from camcomp.diagnosis.model.search import search_sets
+from camcomp.diagnosis.model.search import best_of, search_sets
 from camcomp.diagnosis.search.fitted_sets import LinearSets
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale, scored
 from camcomp.diagnosis.statistics.evidence import Prior, gram
@@ -32,17 +32,17 @@ def test_springs_and_force_are_found_though_two_that_undo_one_another_do_nearly_
     wrong = D[:, list(TRUTH)].sum(axis=1)
     D[:, WEIGHT] = wrong + D[:, LENGTH] + 0.15 * D[:, WEIGHT]
     data = sets(D, wrong + noise)
-    assert search_sets(data).best == TRUTH
+    assert best_of(search_sets(data)) == TRUTH
     assert scored(data.scale, [(WEIGHT, LENGTH), TRUTH])[0][1] == TRUTH
 
 
 def test_a_cause_of_two_columns_is_found_and_never_jointly_with_one_that_it_excludes():
     D, noise = drawn(3)
     r = D[:, 0] + D[:, 7] - D[:, 8] + noise
-    assert search_sets(sets(D, r)).best == (0, TWO)
+    assert best_of(search_sets(sets(D, r))) == (0, TWO)
     found = search_sets(sets(D, r, excluded=0))
-    assert found.best == (TWO,)
-    assert not [members for members in found.values if {0, TWO} <= set(members)]
+    assert best_of(found) == (TWO,)
+    assert not [members for members in found if {0, TWO} <= set(members)]
 
 
 def test_one_more_member_is_worth_what_the_larger_set_is():

@@ -6,10 +6,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.arm.next_poses import pose_list
 from camcomp.diagnosis.arm.poses import ArmBench
 from camcomp.diagnosis.model.design import designed
 from camcomp.diagnosis.model.folds import without_nuisances
-from camcomp.diagnosis.next_experiment.pose_list import pose_list
 from camcomp.diagnosis.result.types import PosesToMeasure
 from tests.commandline import camcomp, table
 from tests.validation.measured.test_ur10 import campaigns

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.model.candidates import PlacedCause
-from camcomp.diagnosis.model.search import search_sets
+from camcomp.diagnosis.model.search import best_of, search_sets
 from camcomp.diagnosis.search.fitted_sets import LinearSets
 from camcomp.diagnosis.statistics.cause_sets import (
     SIZES,
@@ -29,11 +29,11 @@ def fitted(*members):
     )
 
 
-def best_of(scale):
+def found_in(scale):
     """The best set of candidates of one column each."""
     columns = scale.candidates.columns
     places = [PlacedCause(str(i), None, own) for i, own in enumerate(columns)]
-    return search_sets(LinearSets(scale, range(len(columns)), places)).best
+    return best_of(search_sets(LinearSets(scale, range(len(columns)), places)))
 
 
 @pytest.mark.parametrize("size", [0, 1, 2, 3])
@@ -50,7 +50,7 @@ def test_one_member_exchanged_or_left_out_leads_from_a_set_that_was_put_together
     D[:, 2] = (D[:, 0] + D[:, 1]) / np.sqrt(2.0) + 0.1 * D[:, 2]
     prior = Prior(np.full(5, 1e-3), np.ones(5), np.zeros(5), np.full(5, np.inf))
     scale = Scale(gram(D, 0.7 * (D[:, 0] + D[:, 1]) + rng.standard_normal(400)), prior, candidates(5))
-    assert best_of(scale) == (0, 1)
+    assert found_in(scale) == (0, 1)
 
 
 def test_a_member_that_stood_for_two_is_parted_beside_the_others():
@@ -62,7 +62,7 @@ def test_a_member_that_stood_for_two_is_parted_beside_the_others():
     D[:, 2] = both / 0.3 + 0.6 * D[:, 2]
     prior = Prior(np.full(6, 1e-3), np.ones(6), np.zeros(6), np.full(6, np.inf))
     scale = Scale(gram(D, 4.0 * both + 0.7 * D[:, 4] + rng.standard_normal(400)), prior, candidates(6))
-    assert best_of(scale) == (0, 1, 4)
+    assert found_in(scale) == (0, 1, 4)
 
 
 def test_one_effect_at_three_targets_is_likelier_than_three_effects_and_at_two_it_is_not():

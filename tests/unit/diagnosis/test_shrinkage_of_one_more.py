@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.answer.unseen import JudgedRun, unseen_shrinkage
-from camcomp.diagnosis.statistics.shrinkage import of_one_more, scatter
+from camcomp.diagnosis.answer.unseen import JudgedRun, of_one_more, scatter, unseen_shrinkage
 
 
 def shrinkage(before, after):
