@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from camcomp.diagnosis.answer.unseen import JudgedRun, unseen_shrinkage
-from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, thinned
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run
 from camcomp.diagnosis.fit.columns import candidate_columns
+from camcomp.diagnosis.fit.gap import square_lengths
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.result.types import UnseenShrinkage
@@ -39,7 +40,9 @@ def shrinkage_of(
     def squares(count: int) -> list[Floats]:
         """With so many members of the answer, as far as they were chosen; with all of them, all that was."""
         these = [[c for i, c in each.items() if count == len(members) or i in members[:count]] for each in chosen]
-        return [_square(gap) for gap in _without([seen.gap(k, each)[:, part] for k, each in enumerate(these)], free)]
+        return [
+            square_lengths(gap) for gap in _without([seen.gap(k, each)[:, part] for k, each in enumerate(these)], free)
+        ]
 
     per_step = [squares(count) for count in range(len(members) + 1)]
     candidates = [problem.columns.candidates[i] for i in members]
@@ -50,12 +53,6 @@ def shrinkage_of(
     ceiling, before = _ceiling(problem, best, seen, part, free), found.before_rms_um
     ratio = round(1.0 - ceiling / before, 4) if before > 0 else 0.0
     return found.model_copy(update={"ceiling_rms_um": round(ceiling, 3), "ceiling_ratio": ratio})
-
-
-def _square(gap: Floats) -> Floats:
-    """Squared length (n,) of the gap over the channels that the run has; NaN where one of them is missing."""
-    here = np.isfinite(gap).any(axis=0)
-    return np.asarray(np.sum(gap[:, here] ** 2, axis=1)) if here.any() else np.full(len(gap), np.nan)
 
 
 def _ceiling(problem: Problem, best: Fitted, seen: Bench, part: slice, free: Sequence[Floats]) -> float:
@@ -83,9 +80,7 @@ def _nuisances(seen: Bench, fitted: Sequence[Run], part: slice) -> tuple[list[Fl
     """Columns (per run (n, c, k)) and names of the nuisances that only held-out runs determine: the workpiece frame of
     another clamping and the offset of another clock.
     """
-    blocks = [
-        np.zeros((len(thinned(run.run_path.time[:, None], run.thin)), part.stop - part.start, 0)) for run in seen.runs
-    ]
+    blocks = [np.zeros((len(run.run_path.time) // run.thin, part.stop - part.start, 0)) for run in seen.runs]
     named: list[str] = []
     if part.start != 0:
         return blocks, named

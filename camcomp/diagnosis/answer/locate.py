@@ -26,9 +26,9 @@ def run_gaps(problem: Problem, causes: Sequence[Cause] = ()) -> list[places.RunG
         gap = problem.bench.gap(k, causes)[:, part]
         noise = problem.noise.sigma[k, part]
         thin = float(np.mean([1.0 / effective_rows(problem.noise, c, 1) for c in range(part.start, part.stop)]))
-        line = thinned(run.measured.line[:, None], run.thin)[:, 0]
+        line = thinned(run.measured.line, run.thin)
         if part.start == 0:
-            slope = problem.bench.thin_slopes(k)
+            slope = problem.bench.thin_slopes[k]
             clean = np.where(np.isfinite(gap), gap, 0.0)
             drives = np.einsum("nij,nj->ni", np.linalg.pinv(slope), clean)
         else:

@@ -139,7 +139,10 @@ def axis_law(
     before, after = (1e-3 * each for each in (law.before_rms_um, law.after_rms_um))
     says = f"{law.says} The drive force of {name} goes from {before:.3g} N to {after:.3g} N (rms)."
     if second is None:  # the gap itself does not show it
-        unchanged = {} if following is None else dict.fromkeys(("before_rms_um", "after_rms_um"), _size_um(following))
+        size = (
+            None if following is None else round(1e3 * float(np.sqrt(np.mean(np.concatenate(following.left) ** 2))), 3)
+        )
+        unchanged = {} if size is None else dict.fromkeys(("before_rms_um", "after_rms_um"), size)
         return law.model_copy(update={"says": says, **unchanged})
     return second.model_copy(
         update={
@@ -155,10 +158,6 @@ def _written(name: str, following: AxisChannel, told: Sequence[AxisTravel], foun
     same = fitted(Shapes(rows), [Term(rows.spot, t.form) for t in found.terms], rows.folds(usual_split(len(told))))
     before, after = _sizes_um(rows, same)
     return None if after > BETTER * before else law_result(rows, same, before, after)
-
-
-def _size_um(channel: AxisChannel) -> float:
-    return round(1e3 * float(np.sqrt(np.mean(np.concatenate(channel.left) ** 2))), 3)
 
 
 def _found(rows: AxisRows) -> FoundLaw | None:

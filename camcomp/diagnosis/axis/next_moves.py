@@ -43,7 +43,8 @@ def next_moves(
     if verdict not in (UNKNOWN, "ambiguous"):
         return None
     asked = [a for a in found if a.strange] or found  # something unknown is asked of the axes that show it
-    for axis in sorted(asked, key=_excess, reverse=True):
+    above = {a.name: max((c.squares[1] / max(c.floor, 1e-12) ** 2 for c in a.channels), default=0.0) for a in asked}
+    for axis in sorted(asked, key=lambda a: above[a.name], reverse=True):
         logs = [run for run in runs[axis.name] if np.isfinite(run.encoder).sum() > 2 * axis.wide + 1]
         designed = _designed(axis, logs)
         if designed is not None:
@@ -74,11 +75,6 @@ def stroke_table(moves: AxisMoves) -> str:
     time, place = set_points(moves)
     rows = (f"{t:.6f},{at:.6f}\n" for t, at in zip(time.tolist(), (place + 0.0).tolist(), strict=True))
     return f"t_s,cmd_{moves.axis}_{moves.unit}\n{''.join(rows)}"
-
-
-def _excess(axis: AxisFindings) -> float:
-    """How far above their floors the channels are."""
-    return max((c.squares[1] / max(c.floor, 1e-12) ** 2 for c in axis.channels), default=0.0)
 
 
 def _designed(axis: AxisFindings, logs: Sequence[AxisRun]) -> tuple[AxisMoves, float] | None:

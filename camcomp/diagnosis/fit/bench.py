@@ -100,8 +100,6 @@ class Bench:
     nominal: list[Reading] = field(default_factory=list)
     # of candidates at nominal, worked out before: parameters, then runs (n, c)
     columns: dict[tuple[Any, ...], list[list[Floats]]] = field(default_factory=dict)
-    _row_slopes: dict[int, Floats] = field(default_factory=dict)
-    _thin_slopes: dict[int, Floats] = field(default_factory=dict)
     _out: list[Bools] = field(default_factory=list)
     # structures of changed machines, by run and change
     _changed: dict[tuple[Any, ...], Solved] = field(default_factory=dict)
@@ -141,20 +139,17 @@ class Bench:
             self._changed[key] = used
         return reading
 
-    def row_slopes(self, k: int) -> Floats:
-        """Derivative (n, 3, m) of the tip in the program frame by the carriages, at every row of run k."""
-        if k not in self._row_slopes:
-            run = self.runs[k]
-            at_nodes = self.twin.rotation.T @ self.slopes[k].tip_rho
-            self._row_slopes[k] = rows_together(run.run_path.row_place.of(at_nodes))
-        return self._row_slopes[k]
+    @cached_property
+    def row_slopes(self) -> list[Floats]:
+        """Derivative (n, 3, m) of the tip in the program frame by the carriages, at every row of every run."""
+        every = zip(self.runs, self.slopes, strict=True)
+        at_rows = [run.run_path.row_place.of(self.twin.rotation.T @ slopes.tip_rho) for run, slopes in every]
+        return [rows_together(each) for each in at_rows]
 
-    def thin_slopes(self, k: int) -> Floats:
+    @cached_property
+    def thin_slopes(self) -> list[Floats]:
         """The same (n', 3, m) at the rows that are kept after thinning."""
-        if k not in self._thin_slopes:
-            slopes, thin = self.row_slopes(k), self.runs[k].thin
-            self._thin_slopes[k] = thinned(slopes.reshape(len(slopes), -1), thin).reshape(-1, *slopes.shape[1:])
-        return self._thin_slopes[k]
+        return [thinned(slopes, run.thin) for slopes, run in zip(self.row_slopes, self.runs, strict=True)]
 
     @cached_property
     def springs(self) -> Floats:
@@ -247,11 +242,11 @@ class Bench:
 
 
 def thinned(values: Floats, factor: int) -> Floats:
-    """Means (n // factor, c) of `factor` rows each, NaN where one is missing."""
+    """Means (n // factor, ...) of `factor` rows (n, ...) each, NaN where one is missing."""
     if factor == 1:
         return values
     n = len(values) // factor
-    return np.asarray(np.einsum("nfc->nc", values[: n * factor].reshape(n, factor, -1)) / factor)
+    return np.asarray(np.einsum("nf...->n...", values[: n * factor].reshape(n, factor, *values.shape[1:])) / factor)
 
 
 def means(values: Floats, ways: Floats, factor: int) -> Floats:

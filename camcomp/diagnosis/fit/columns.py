@@ -220,7 +220,7 @@ def moved_tip(bench: Bench, k: int, changes: Floats, rows: slice = slice(None)) 
     if bench.runs[k].turn is not None:
         moved = moved * np.array([0.0, 1.0, 1.0])[:, None]
     if bench.runs[k].by == "setpoint" and bench.runs[k].measured.has("encoder"):
-        ways = bench.thin_slopes(k)[rows]
+        ways = bench.thin_slopes[k][rows]
         moved = moved + ways @ changes[:, 3 : 3 + ways.shape[2]]
     return moved
 

@@ -45,7 +45,7 @@ class NoiseFloor:
 def measure_floor(bench: Bench, stated_mm: float | None = None) -> NoiseFloor:
     """The floor of a bench's runs. stated_mm: the whole deviation of the tip's instrument per axis, where the user states it."""
     gaps = [np.where(_fast(bench, k)[:, None], np.nan, bench.residual(k)) for k in range(len(bench.runs))]
-    times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in bench.runs]
+    times = [thinned(run.run_path.time, run.thin) for run in bench.runs]
     fast = np.full(gaps[0].shape[1], np.nan)
     for c in range(len(fast)):
         scatter = steady_scatter if c < 3 else row_scatter
@@ -73,7 +73,7 @@ def _fast(bench: Bench, k: int) -> Bools:
         return np.zeros(len(bench.residual(k)), bool)
     speed = 60.0 * np.linalg.norm(np.gradient(bench.nominal[k].tip, run.run_path.time, axis=0), axis=1)
     fast = np.nan_to_num(speed) > RAPID_TIMES * np.nan_to_num(run.run_path.feed_mm_per_min, nan=np.inf)
-    found = thinned(fast[:, None].astype(float), run.thin)[:, 0] > 0.0
+    found = thinned(fast.astype(float), run.thin) > 0.0
     return found if found.mean() < 0.5 else np.zeros(len(found), bool)
 
 

@@ -26,11 +26,14 @@ def gap_sizes(problem: Problem, f: Fitted) -> Floats:
     """Length (n,), um, of the gap at all known rows of all runs, with the offsets of labels from the fit f removed."""
     part = main_channels(problem)
     gaps = [problem.bench.gap(k, of_labels)[:, part] for k, of_labels in enumerate(_label_causes(problem, f))]
-    # the gap is formed from the axes that were measured
-    size = np.concatenate(
-        [np.where(np.isfinite(g).any(axis=1), np.sqrt(np.nansum(g**2, axis=1)), np.nan) for g in _together(gaps)]
-    )
+    size = np.sqrt(np.concatenate([square_lengths(g) for g in gaps]))
     return np.asarray(size[np.isfinite(size)] * 1e3)
+
+
+def square_lengths(gap: Floats) -> Floats:
+    """Squared length (n,) of a gap (n, c) over the channels that the run has; NaN where one of them is missing."""
+    here = np.isfinite(gap).any(axis=0)
+    return np.asarray(np.sum(gap[:, here] ** 2, axis=1)) if here.any() else np.full(len(gap), np.nan)
 
 
 def _label_causes(problem: Problem, f: Fitted) -> list[list[Cause]]:
@@ -65,16 +68,6 @@ def floor_um(problem: Problem) -> float:
     return 1e3 * float(np.sqrt(np.nansum(fast**2)))
 
 
-def _together(gaps: list[Floats]) -> list[Floats]:
-    """Gaps with rows blanked where a channel that the run has is missing."""
-    out = []
-    for g in gaps:
-        known = np.isfinite(g)
-        whole = np.all(known | ~np.any(known, axis=0), axis=1)
-        out.append(np.where(np.reshape(whole, (-1, 1)), g, np.nan))
-    return out
-
-
 def rest_by_actuator(problem: Problem, f: Fitted, kind: str) -> dict[str, float]:
     """Energy that a set leaves in one kind of channel by actuator, as shares; that of the tip read as motion of the carriages."""
     if kind == "dyno":
@@ -84,6 +77,6 @@ def rest_by_actuator(problem: Problem, f: Fitted, kind: str) -> dict[str, float]
     for k in range(len(bench.runs)):
         rest = np.nan_to_num(bench.difference(k, bench.read(k, causes))[:, problem.channels_of(kind)])
         if kind == "tip":
-            rest = np.einsum("nij,nj->ni", np.linalg.pinv(bench.thin_slopes(k)), rest)
+            rest = np.einsum("nij,nj->ni", np.linalg.pinv(bench.thin_slopes[k]), rest)
         energy += np.sum(rest**2, axis=0)
     return places.shares(dict(zip(bench.actuators, energy.tolist(), strict=True)))

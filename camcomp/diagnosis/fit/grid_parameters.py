@@ -124,7 +124,7 @@ def quick_columns(
             if force is not None:
                 effort[:, i] = force[:, aimed].T
         parts = [(every[:0], np.zeros((n // run.thin, 0)))] * (6 + 2 * m)
-        ways = [np.ascontiguousarray(bench.turned(k, bench.row_slopes(k)[:, :, j]).T) for j in aimed]
+        ways = [np.ascontiguousarray(bench.turned(k, bench.row_slopes[k][:, :, j]).T) for j in aimed]
         tip = np.zeros((3, n // run.thin, len(causes)))
         for each, way in zip(moved, ways, strict=True):
             tip += means(each.T, way, run.thin)

@@ -41,7 +41,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     outliers = outlying(bench)
     bench.without(outliers)
     floor = measure_floor(bench, stated_mm)
-    times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in bench.runs]
+    times = [thinned(run.run_path.time, run.thin) for run in bench.runs]
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
     noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
     every = zip(inflation(bench), noise.sigma, tails(bench), strict=True)

@@ -89,7 +89,7 @@ def _as_the_tip_says(bench: Bench, k: int, gap: Floats, odd: Bools) -> Bools:
     out = np.zeros(gap.shape, bool)
     if run.by == "setpoint" and run.encoders is not None and odd[:, encoders].any():
         tip = np.where(odd[:, :3].any(axis=1, keepdims=True), np.nan, gap[:, :3])
-        along = _gone_along(tip, gap[:, encoders], bench.row_slopes(k), odd[:, encoders])
+        along = _gone_along(tip, gap[:, encoders], bench.row_slopes[k], odd[:, encoders])
         out[:, encoders] = odd[:, encoders] & along[:, None]
     return out
 

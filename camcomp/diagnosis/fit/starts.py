@@ -45,7 +45,7 @@ def start_columns(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> 
             if still.sum() < STARTING_ROWS:
                 continue
             shift = np.zeros_like(bench.observed(r))
-            shift[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
+            shift[:, :3] = bench.turned(r, bench.row_slopes[r][:, :, j] * still[:, None])
             begins = still.mean() < 1.0 - ALWAYS
             width = START_MM if begins else STOOD_MM
             found.append((f"start.{run.name}.{a}", width / lever, only(r, shift)))
@@ -81,7 +81,7 @@ def unknown_starts(bench: Bench, k: int) -> Floats:
             rows += (i + np.flatnonzero(under_way)).tolist() if short or i == 0 else []
         unknown = np.zeros(len(path.time))
         unknown[rows] = START_MM / lever
-        out[:, :3] = np.hypot(out[:, :3], bench.turned(k, bench.row_slopes(k)[:, :, j] * unknown[:, None]))
+        out[:, :3] = np.hypot(out[:, :3], bench.turned(k, bench.row_slopes[k][:, :, j] * unknown[:, None]))
         out[rows, 3 + m + j] = START_N * lever
     return out
 

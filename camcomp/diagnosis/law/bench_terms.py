@@ -162,7 +162,7 @@ class TermBench(TermRows):
     def tip_ways(self, spot: Spot) -> list[Floats]:
         """By how much the tip (n, 3), program frame, moves per unit at the spot, per run."""
         if spot.on in ("control", "drive"):
-            return [self.bench.row_slopes(k)[:, :, spot.index] for k in range(len(self.bench.runs))]
+            return [slopes[:, :, spot.index] for slopes in self.bench.row_slopes]
         return [np.tile(np.eye(3)[spot.index], (n, 1)) for n in self.row_counts]
 
     def rms(self, spot: Spot, values: Sequence[Floats]) -> Floats:
@@ -176,8 +176,7 @@ class TermBench(TermRows):
         """What functions (n, f) at a spot do to the tip (n', 3, f), thinned, per run."""
         out = []
         for way, v, run in zip(self.tip_ways(spot), values, self.bench.runs, strict=True):
-            moved = way[:, :, None] * v[:, None, :]
-            out.append(thinned(moved.reshape(len(v), -1), run.thin).reshape(-1, 3, v.shape[1]))
+            out.append(thinned(way[:, :, None] * v[:, None, :], run.thin))
         return out
 
     def _reach(self, spot: Spot, k: int) -> tuple[list[int], Floats]:

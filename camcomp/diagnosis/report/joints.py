@@ -32,7 +32,12 @@ def joints_section(result: DiagnosisResult, residuals: Mapping[str, NDArray[Any]
             f"{100.0 * shrunk.covered_share:.0f} % of the unseen poses have every such joint at angles that were seen: "
             f"{brief(shrunk.covered_rms_um)} µm are left there, {brief(shrunk.after_rms_um)} µm on all of them."
         )
-    rows = [[str(c.target), *_amplitude(c), f"{100.0 * c.curve.seen_share:.0f} %", _intervals(c.curve)] for c in causes]
+    rows = []
+    for c in causes:
+        size, seen = c.parameters["amplitude_rad"], f"{100.0 * c.curve.seen_share:.0f} %"
+        low, high = size.ci95
+        interval = f"{1e6 * low:.0f} to {1e6 * high:.0f}"
+        rows.append([str(c.target), f"{1e6 * size.value:.0f}", interval, seen, _intervals(c.curve)])
     table = Table("Curves of the joints", ("joint", "amplitude µrad", "95 %", "of a turn seen", "seen at deg"), rows)
     figures = [_curve(str(c.target), c.curve) for c in causes]
     if residuals is not None and shrunk is not None and (spread := _spread(residuals, shrunk.holdout)) is not None:
@@ -40,12 +45,6 @@ def joints_section(result: DiagnosisResult, residuals: Mapping[str, NDArray[Any]
     return Section(
         name="joints", title="Errors of the joints over their turn", text=text, figures=figures, tables=[table]
     )
-
-
-def _amplitude(cause: CurveCause) -> tuple[str, str]:
-    size = cause.parameters["amplitude_rad"]
-    low, high = size.ci95
-    return f"{1e6 * size.value:.0f}", f"{1e6 * low:.0f} to {1e6 * high:.0f}"
 
 
 def _intervals(curve: ErrorCurve) -> str:

@@ -111,8 +111,8 @@ def _view(problem: Problem, bench: Bench, k: int, causes: Sequence[Cause], *, he
     return RunView(
         name=run.name,
         held_out=held_out,
-        time=thinned(run.run_path.time[:, None], run.thin)[:, 0],
-        line=thinned(run.measured.line[:, None], run.thin)[:, 0],
+        time=thinned(run.run_path.time, run.thin),
+        line=thinned(run.measured.line, run.thin),
         position=thinned(bench.nominal[k].tip, run.thin),
         before=1e3 * before[:, part],
         after=1e3 * after[:, part],
@@ -134,7 +134,7 @@ def _law_view(problem: Problem, answer: LawAnswer) -> LawView:
     runs, sizes = [], []
     every = zip(bench.runs, term_bench(problem).rows(spot), answer.before, answer.gaps, answer.signal, strict=True)
     for run, own, before, gap, signal in every:
-        x = thinned(own[covariate][:, None], run.thin)[:, 0]
+        x = thinned(own[covariate], run.thin)
         runs.append((run.name, x, 1e3 * gap[:, axis], 1e3 * signal[:, axis]))
         sizes.append((rms_um([before]), rms_um([gap], [signal])))
     return LawView(covariate, "xyz"[axis], tuple(runs), np.array(sizes))

@@ -49,7 +49,8 @@ def search_causes(problem: Problem) -> CauseSearch:
     kept = _keep_causes(problem, ranked.best, fitted)
     ranked = _with_answer(problem, ranked, kept.known, temperature)
     stated = _stated(ranked, kept)
-    left, kind = _describe_residual(problem, kept)
+    left = residual_tests(problem, kept.known, problem.prior if kept.kind is None else firm_prior(problem))
+    kind = kept.kind if kept.kind is None or kept.kind in left else next(iter(left))
     return CauseSearch(
         sets=ranked, word=_verdict(ranked, stated, kind), stated=stated, left=left, unknown_in=kind, beyond=kept.beyond
     )
@@ -142,12 +143,6 @@ def _verdict(sets: RankedSets, stated: Mapping[int, float], kind: str | None) ->
         unknown=float(kind is not None), best=min((stated[i] for i in sets.best.members), default=1.0),
         causes=len(sets.best.members), alternatives=len(sets.rivals),
     )  # fmt: skip
-
-
-def _describe_residual(problem: Problem, kept: _Kept) -> tuple[dict[str, ResidualTest], str | None]:
-    """Covariates of the residual per kind of channel, and the kind in which something unmodelled shows."""
-    left = residual_tests(problem, kept.known, problem.prior if kept.kind is None else firm_prior(problem))
-    return left, kept.kind if kept.kind is None or kept.kind in left else next(iter(left))
 
 
 def above_floor(problem: Problem, beyond: Mapping[str, Unexplained], modelled_um: float = 0.0) -> list[Unexplained]:

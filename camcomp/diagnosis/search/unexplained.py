@@ -88,8 +88,7 @@ def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
     """Residuals (n, 3) of one kind of channel, mm at the tip, of run k."""
     channels = problem.channels_of(kind)
     ways = problem.bench.at_tip(k)[:, :, channels]
-    ways = thinned(ways.reshape(len(ways), -1), problem.bench.runs[k].thin).reshape(-1, *ways.shape[1:])
-    return np.asarray(np.einsum("nij,nj->ni", ways, left[:, channels]))
+    return np.asarray(np.einsum("nij,nj->ni", thinned(ways, problem.bench.runs[k].thin), left[:, channels]))
 
 
 def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:

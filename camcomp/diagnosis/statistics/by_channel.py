@@ -65,17 +65,12 @@ class ByChannel:
         return self._rows(key)
 
     def _columns(self, index: Ints) -> Floats:
-        out = np.zeros((len(self), len(index)))
-        for (to, X), at in zip(self.placed(index, np.arange(len(index)), len(index)).parts, self._starts, strict=False):
-            out[at : at + len(X), to] = X
+        out, place = np.zeros((len(self), len(index))), np.full(self.width, -1)
+        place[index] = np.arange(len(index))
+        for (on, X), at in zip(self.parts, self._starts, strict=False):
+            asked = place[on] >= 0
+            out[at : at + len(X), place[on[asked]]] = X[:, asked]
         return out
-
-    def placed(self, index: Ints, to: Ints, width: int) -> ByChannel:
-        """Columns `index` (d,) alone, in the places `to` (d,) of a matrix of some width."""
-        place = np.full(self.width, -1)
-        place[index] = to
-        some = [(place[on], X) for on, X in self.parts]
-        return ByChannel(width, tuple((at[at >= 0], X[:, at >= 0]) for at, X in some))
 
     def _rows(self, rows: slice | Ints) -> ByChannel:
         if isinstance(rows, slice):
