@@ -65,7 +65,7 @@ def test_where_a_guide_holds_its_carriage_when_a_log_begins_is_not_known(tmp_pat
     machine, run = MACHINES["router"], Run(recording.load("zigzag-10um"), True, 100.0)
     t = row_times(run, Plan(0, rows=150), False, np.random.default_rng(1))
     opened = logged(tmp_path, machine, run, observe(machine, run, Faults(), Character(), t))
-    columns = build(Bench(twin=opened.twin, runs=opened.runs), [], {}, 3.0, 1.0)
+    columns = build(Bench(twin=opened.twin, runs=opened.runs), [], {}, 3.0)
     within = dict(zip(columns.names, columns.prior.tolerance, strict=True))
     assert within["start.one.x"] > 0.05
     assert within["held.one.x"] > 150.0

@@ -16,7 +16,7 @@ from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
 from camcomp.diagnosis.fit.starts import Nuisance, start_columns
-from camcomp.diagnosis.model.noise import HEALTHY, REPEATABILITY_MM
+from camcomp.diagnosis.model.noise import HEALTHY, MINOR, REPEATABILITY_MM
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground import shelf
@@ -139,26 +139,23 @@ def build(
     candidates: Sequence[CandidateCause],
     shapes: Mapping[int, Mapping[str, float]],
     floor_um: float,
-    minor_um: float,
 ) -> Columns:
     """All columns at nominal. Candidates that no channel can see have columns of zeros and stay.
 
     Every healthy machine has a little of everything: what moves the tip by HEALTHY of the noise floor is within tolerance,
-    whatever other channels see of it; what moves it by more than minor_um is a cause. Nuisances reach as many of their
+    whatever other channels see of it; what moves it by more than MINOR of it is a cause. Nuisances reach as many of their
     tolerances: a healthy one goes beyond once in 5600.
     """
     owner: list[int] = []
     names: list[str] = []
     tolerance: list[float] = []
-    reach: list[float] = []
     sign: list[float] = []
     parts: list[list[Floats]] = []
 
-    def put(who: int, name: str, size: float, most: float, per_run: list[Floats], *, signed: int = 0) -> None:
+    def put(who: int, name: str, size: float, per_run: list[Floats], *, signed: int = 0) -> None:
         owner.append(who)
         names.append(name)
         tolerance.append(size)
-        reach.append(most)
         sign.append(float(signed))
         parts.append(per_run)
 
@@ -168,37 +165,30 @@ def build(
             candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
             strict=True,
         ):
-            size, most = healthy_sizes(
-                bench=bench, candidate=candidate, p=p, per_run=per_run, floor_um=floor_um, minor_um=minor_um
-            )
-            put(i, f"{candidate.label}.{p.name}", size, most, per_run, signed=p.sign)
+            size = healthy_size(bench, candidate, p, per_run, floor_um)
+            put(i, f"{candidate.label}.{p.name}", size, per_run, signed=p.sign)
     for name, size, per_run in _nuisances(bench):
         if name.startswith("spring."):  # a soft machine has no more of it than of anything else
             size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
-        put(-1, name, size, minor_um / (HEALTHY * floor_um) * size, per_run)
+        put(-1, name, size, per_run)
     channels = range(6 + 2 * len(bench.actuators))
     blocks = tuple(
         ByChannel.of(np.stack([each[r][:, c] for each in parts], axis=1) for c in channels)
         for r in range(len(bench.runs))
     )
     bench.columns.clear()  # they stand in the blocks now
-    k = len(owner)
-    prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(reach))
+    prior = Prior(np.array(tolerance), np.array(sign), MINOR / HEALTHY * np.array(tolerance))
     return Columns(tuple(candidates), np.array(owner), tuple(names), prior, blocks)
 
 
-def healthy_sizes(
-    bench: Bench, candidate: CandidateCause, p: Parameter, per_run: Sequence[Floats], floor_um: float, minor_um: float
-) -> tuple[float, float]:
-    """Standard deviation of a parameter on healthy machines, and the largest size below MINOR, both in scales of the
-    parameter.
-
-    per_run: columns (n, c) of the parameter; floor_um and minor_um: noise floor and MINOR at the tip, um.
-    """
+def healthy_size(
+    bench: Bench, candidate: CandidateCause, p: Parameter, per_run: Sequence[Floats], floor_um: float
+) -> float:
+    """Standard deviation of a parameter on healthy machines, in its scales; per_run: its columns (n, c)."""
     healthy = HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9)
     if any(each.placed for each in candidate.shapes):  # nothing happens for a while to every healthy machine
         healthy = min(healthy, p.tolerance / p.scale)
-    return min(healthy, MOST_HEALTHY), minor_um / (HEALTHY * floor_um) * healthy
+    return min(healthy, MOST_HEALTHY)
 
 
 def tip_um(bench: Bench, per_run: Sequence[Floats]) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.evidence import within
+from camcomp.diagnosis.statistics.evidence import FREE, within
 from camcomp.ground.datatypes import Floats
 
 FORMULA = 0.005  # share of its size by which an effect's formula itself is off: no guide turns round as Dahl wrote
@@ -31,7 +31,7 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
     G = [W.appended(D * reach) for W, D in zip(problem.white_at(f), shapes, strict=True)]
     usual, most = _stated(problem, problem.prior.precision, problem.prior.reach.copy())
     precision = np.concatenate([usual, np.ones(s)])
-    precision[index] = 1e-2 / problem.prior.scale[index] ** 2
+    precision[index] = FREE
     M = sum((g.T @ g for g in G), np.diag(precision))
     size = 1.0 / np.sqrt(np.diag(M))
     C = size[:, None] * np.linalg.inv(size[:, None] * M * size) * size

@@ -11,7 +11,7 @@ from camcomp.diagnosis.fit.columns import (
     build,
     candidate_columns,
     first_guess,
-    healthy_sizes,
+    healthy_size,
     patterns,
     shape_default,
 )
@@ -26,7 +26,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.folds import Folds, Split
 from camcomp.diagnosis.model.evidence import ABSENT
 from camcomp.diagnosis.model.group import sum_grams
-from camcomp.diagnosis.model.noise import MINOR
+from camcomp.diagnosis.model.noise import HEALTHY, MINOR
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import Noise
@@ -47,7 +47,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     every = zip(inflation(bench), noise.sigma, tails(bench), strict=True)
     inflate = [np.sqrt(1.0 + (extra / sigma) ** 2) * heavy for extra, sigma, heavy in every]
     guessed = {i: guess for i, each in enumerate(candidates) if (guess := first_guess(bench, each)) is not None}
-    columns = build(bench, candidates, guessed, floor.tip_um, MINOR * floor.tip_um)
+    columns = build(bench, candidates, guessed, floor.tip_um)
     shapes: dict[int, dict[str, float]] = {
         i: guessed.get(i, shape_default(a)) for i, a in enumerate(candidates) if a.shapes or a.switches
     }
@@ -130,15 +130,12 @@ def _scanned(problem: Problem) -> Problem:
         columns = candidate_columns(problem.bench, candidate, best)
         changed.append((list(problem.candidates.columns[i]), columns))
     blocks, whole = list(problem.columns.blocks), list(problem.white)
-    floor_um = problem.floor.tip_um
     prior = replace(problem.prior, tolerance=problem.prior.tolerance.copy(), reach=problem.prior.reach.copy())
     for index, columns in changed:
         candidate = problem.columns.candidates[problem.columns.candidate[index[0]]]
         for c, p, per_run in zip(index, candidate.parameters, columns, strict=True):
-            prior.tolerance[c], prior.reach[c] = healthy_sizes(
-                bench=problem.bench, candidate=candidate, p=p, per_run=per_run, floor_um=floor_um,
-                minor_um=MINOR * floor_um,
-            )  # fmt: skip
+            prior.tolerance[c] = healthy_size(problem.bench, candidate, p, per_run, problem.floor.tip_um)
+            prior.reach[c] = MINOR / HEALTHY * prior.tolerance[c]
         for k in range(len(blocks)):
             new = np.stack([each[k] for each in columns], axis=2)
             blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))

@@ -20,7 +20,7 @@ from camcomp.diagnosis.result.types import Law
 from camcomp.diagnosis.search.unknown import firm_prior
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, temperature_of
-from camcomp.diagnosis.statistics.evidence import Prior
+from camcomp.diagnosis.statistics.evidence import FREE, Prior
 from camcomp.ground.datatypes import Floats
 
 
@@ -116,7 +116,7 @@ def _base(problem: Problem, f: Fitted | None, bench: TermBench, kind: str) -> Ca
     else:
         white, residual = problem.white_at(f), list(f.residual)
         precision, members = problem.prior.precision, problem.member_columns(f.members)
-        precision[members] = 1.0 / (10.0 * problem.prior.scale[members]) ** 2
+        precision[members] = FREE
     places = [problem.row_places(k) for k in range(len(residual))]
     tips = [s for s in spots(len(problem.bench.actuators), kind) if s.on != "drive"]
     ones = [bench.white(s, [np.ones((r.rows, 1)) for r in bench.rows(s)]) for s in tips]
@@ -158,7 +158,6 @@ def with_law(problem: Problem, bench: TermBench, found: FoundLaw) -> Problem:
     more, old = len(found.precision), problem.prior
     prior = Prior(
         np.concatenate([old.tolerance, found.precision**-0.5]),
-        np.concatenate([old.scale, np.ones(more)]),
         np.concatenate([old.sign, np.zeros(more)]),
         np.concatenate([old.reach, np.full(more, np.inf)]),
     )

@@ -17,7 +17,6 @@ from camcomp.diagnosis.fit.noise import inflation
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import LARGE
-from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.information_gain import seen_apart
 from camcomp.diagnosis.search.indistinguishable import HIDDEN
@@ -115,8 +114,7 @@ def _lay(question: Question, candidate: Candidate, whole: bool) -> PredictedLogs
     every = problem.columns.candidates
     some = range(len(every)) if whole else question.members
     shapes = {n: question.shapes[i] for n, i in enumerate(some) if i in question.shapes}
-    floor_um = problem.floor.tip_um
-    columns = build(bench, [every[i] for i in some], shapes, floor_um, MINOR * floor_um)
+    columns = build(bench, [every[i] for i in some], shapes, problem.floor.tip_um)
     known = {name: i for i, name in enumerate(problem.columns.names)}
     mine = np.array([i for i, name in enumerate(columns.names) if name in known], int)
     theirs = np.array([known[columns.names[i]] for i in mine], int)

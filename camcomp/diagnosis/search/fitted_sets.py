@@ -49,7 +49,7 @@ class LinearSets:
         """The same (m,) of a set with one of `more` each, the set's own amplitudes free; -inf where two exclude each other."""
         scale, known = self.scale, self.scale.candidates
         own = [c for i in members for c in known.columns[i]]
-        at = freed(scale.base, scale.prior, own) if own else scale.base
+        at = freed(scale.base, own) if own else scale.base
         gains = log_bayes(at, scale.prior, [[known.columns[i]] for i in more])
         gains += [known.prior(tuple(sorted((*members, i)))) for i in more]
         gains[[any(known.exclusive(i, j) for j in members) for i in more]] = -np.inf

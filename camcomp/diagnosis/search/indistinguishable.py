@@ -15,7 +15,7 @@ from scipy.linalg import eigh
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import LARGE
 from camcomp.diagnosis.model.group import NormalEquations, sum_grams
-from camcomp.diagnosis.statistics.evidence import Base, base
+from camcomp.diagnosis.statistics.evidence import FREE, Base, base
 
 HIDDEN = 0.2  # difference of two effects at that size, in units of the noise, below which they are indistinguishable
 
@@ -41,7 +41,7 @@ class Likeness:
         columns, d = self.problem.candidates.columns, len(self.problem.candidates.columns[i])
         index = [*columns[i], *(c for each in free for c in columns[each])]
         known = np.linalg.inv(self.within.covariance[np.ix_(index, index)]) - np.diag(self.within.precision[index])
-        known[d:, d:] += np.diag(1.0 / (10.0 * self.problem.prior.scale[index[d:]]) ** 2)
+        known[d:, d:] += FREE * np.eye(len(index) - d)
         left = known[:d, :d] - known[:d, d:] @ np.linalg.solve(known[d:, d:], known[d:, :d])
         own = self.data.A[np.ix_(index[:d], index[:d])]
         share = float(eigh(left, own + 1e-12 * np.trace(own) * np.eye(d), eigvals_only=True)[0])

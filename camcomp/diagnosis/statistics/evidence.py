@@ -30,6 +30,7 @@ from camcomp.ground.datatypes import Floats, Ints
 
 PRIOR_WIDTHS = np.array([0.02, 0.1, 0.5, 2.5])
 _WEIGHTS = np.log([0.2, 0.25, 0.3, 0.25])
+FREE = 0.01  # precision of a cause while it is fitted: within 10 scales
 PASSES = 30  # of the search for columns at the end of their reach
 
 
@@ -48,12 +49,11 @@ def gram(D: Floats | ByChannel, r: Floats) -> NormalEquations:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """For every column (k,): tolerance = narrow size (inf = free nuisance), scale = wide size, sign; reach = farthest that
-    it goes without being a cause.
+    """For every column (k,), in units of its typical size: tolerance = narrow size (inf = free nuisance), sign; reach =
+    farthest that it goes without being a cause.
     """
 
     tolerance: Floats
-    scale: Floats
     sign: Floats
     reach: Floats
 
@@ -115,8 +115,7 @@ def _log_bayes(at: Base, prior: Prior, index: Ints, cause: Ints) -> Floats:
     inverse = np.linalg.inv(at.covariance[index[:, :, None], index[:, None]])
     h = (inverse @ mean[:, :, None])[:, :, 0]
     sizes, weight = _widths(int(cause[-1]) + 1)
-    wide = 1.0 / (prior.scale[index][:, None] * sizes[:, cause]) ** 2  # (s, w, d)
-    wide = np.minimum(wide, narrow[:, None])  # a cause is at least as wide as its tolerance
+    wide = np.minimum(1.0 / sizes[:, cause] ** 2, narrow[:, None])  # a cause is at least as wide as its tolerance
     precision = inverse[:, None] + (wide - narrow[:, None])[..., None] * np.eye(len(cause))
     covariance, (sign, log_det) = np.linalg.inv(precision), np.linalg.slogdet(precision)
     variance = np.diagonal(covariance, axis1=2, axis2=3)
@@ -131,7 +130,7 @@ def _log_bayes(at: Base, prior: Prior, index: Ints, cause: Ints) -> Floats:
 
 
 def _widths(count: int) -> tuple[Floats, Floats]:
-    """Widths (w, count) that so many causes may have, in units of their scales, and the log weight (w,) of each."""
+    """Widths (w, count) that so many causes may have, and the log weight (w,) of each."""
     which = _choices(count, len(PRIOR_WIDTHS))
     return PRIOR_WIDTHS[which], _WEIGHTS[which].sum(axis=1)
 
@@ -153,30 +152,30 @@ def estimate(data: NormalEquations, prior: Prior, members: Sequence[int]) -> tup
 def estimate_precision(prior: Prior, members: Sequence[int]) -> Floats:
     """Precision (k,) with the columns `members` free within 10 scales, the others within tolerance."""
     precision = prior.precision
-    precision[list(members)] = _free(prior, members)
+    precision[list(members)] = FREE
     return precision
 
 
-def freed(at: Base, prior: Prior, members: Sequence[int]) -> Base:
+def freed(at: Base, members: Sequence[int]) -> Base:
     """The same with the columns `members` free within 10 scales; its log evidence stays that without them."""
     index = list(members)
-    own, gain = _widened(at, prior, index)
+    own, gain = _widened(at, index)
     precision = at.precision.copy()
-    precision[index] = _free(prior, index)
+    precision[index] = FREE
     return Base(at.mean - own @ (gain @ at.mean[index]), at.covariance - own @ gain @ own.T, precision, at.log_evidence)
 
 
-def _widened(at: Base, prior: Prior, index: list[int]) -> tuple[Floats, Floats]:
+def _widened(at: Base, index: list[int]) -> tuple[Floats, Floats]:
     """Covariance (k, d) of all columns with some, and the gain (d, d) by which freeing those changes mean and covariance."""
     own = at.covariance[:, index]
-    gain = np.linalg.inv(np.diag(1.0 / (_free(prior, index) - at.precision[index])) + own[index])
+    gain = np.linalg.inv(np.diag(1.0 / (FREE - at.precision[index])) + own[index])
     return own, np.asarray(gain, float)
 
 
 def holding_back(at: Base, prior: Prior, members: Sequence[int]) -> float:
     """Log evidence >= 0 that it costs a set with the columns `members` to keep all others within reach."""
     index = list(members)
-    own, gain = _widened(at, prior, index)
+    own, gain = _widened(at, index)
     mean = at.mean - own @ (gain @ at.mean[index])
     return within(mean, lambda held: at.covariance[:, held] - own @ (gain @ own[held].T), _reach(prior, index))[1]
 
@@ -187,11 +186,6 @@ def misfit(data: NormalEquations, prior: Prior, members: Sequence[int]) -> float
     precision = prior.precision
     precision[list(members)] = 0.0
     return float(data.c - 2.0 * data.b @ mean + mean @ data.A @ mean + precision @ mean**2)
-
-
-def _free(prior: Prior, members: Sequence[int]) -> Floats:
-    """Precision (d,) of columns that are free within 10 scales."""
-    return np.asarray(1.0 / (10.0 * prior.scale[list(members)]) ** 2)
 
 
 def _reach(prior: Prior, members: Sequence[int]) -> Floats:
