@@ -145,7 +145,7 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
     if word == "none":
         return None
     if found.unknown_in:
-        return explore(problem, found.left[found.unknown_in].labels, job)
+        return explore(problem, found.left[found.unknown_in], job)
     sets = found.sets
     best = sets.first
     close = [best, *sets.rivals[: MOST_SETS - 1]]
@@ -308,7 +308,7 @@ def _stage(problem: Problem, best: Fitted, found: CauseSearch, law: LawAnswer | 
             return law.law.on
         stage, labels = (
             {"encoder": "control", "dyno": "process"}.get(found.unknown_in),
-            found.left[found.unknown_in].labels,
+            found.left[found.unknown_in],
         )
         return stage or ("structure" if labels and labels[0][0].startswith("force") else "drive")
     if energy:
@@ -327,11 +327,11 @@ def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[SpectralLine]
     if found.unknown_in:
         # a vibration of one frequency depends on time alone
         lines = tuple((f"time:{line.name}", line.share) for line in heard)
-        labels = tuple(sorted((*lines, *found.left[found.unknown_in].labels), key=lambda each: -each[1]))
+        labels = tuple(sorted((*lines, *found.left[found.unknown_in]), key=lambda each: -each[1]))
     else:
         null = problem.refit(())
         at_null = residual_tests(problem, null, firm_prior(problem))
-        labels = max(at_null.values(), key=lambda each: each.energy).labels if at_null else ()
+        labels = next(iter(at_null.values()), ())
     return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:MOST_LISTED] if share > MINOR**2]
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, thinned
-from camcomp.diagnosis.fit.cause_prior import cause_prior
 from camcomp.diagnosis.fit.columns import (
+    Columns,
     build,
     candidate_columns,
     first_guess,
@@ -17,7 +17,7 @@ from camcomp.diagnosis.fit.columns import (
 )
 from camcomp.diagnosis.fit.floor import least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, settled_interval
-from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, never_ending
+from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, log_intervals, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise
 from camcomp.diagnosis.fit.outliers import outlying, tails
@@ -28,6 +28,7 @@ from camcomp.diagnosis.model.evidence import ABSENT
 from camcomp.diagnosis.model.group import sum_grams
 from camcomp.diagnosis.model.noise import HEALTHY, MINOR
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
+from camcomp.diagnosis.statistics.cause_sets import CausePrior
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
@@ -65,6 +66,34 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     problem = replace(problem, noise=noise, white=[])  # two sets of white columns at once are much memory
     problem = _whitened(problem, patterns(bench))
     return _scanned(problem) if shapes else problem
+
+
+def cause_prior(columns: Columns) -> CausePrior:
+    """Prior weights: every effect weighs the same; within an effect one value for all weighs half, or all targets the same.
+
+    Scanned values of a shape are equally likely, and so are the intervals of what acts for a while.
+    """
+    candidates = columns.candidates  # what follows outlives these columns, which are large
+    names = sorted({a.name for a in candidates})
+    weight = []
+    for a in candidates:
+        same = [b for b in candidates if b.name == a.name]
+        common = any(b.target is None for b in same)
+        share = (
+            1.0 / len(same) if not common or len(same) == 1 else (0.5 if a.target is None else 0.5 / (len(same) - 1))
+        )
+        sought = float(sum(np.log(len(p.scan)) for p in a.shapes if not p.placed))
+        sought += log_intervals(len(columns.blocks)) if any(p.placed for p in a.shapes) else 0.0
+        weight.append(np.log(share / len(names)) - sought)
+
+    def exclusive(i: int, j: int) -> bool:
+        a, b = candidates[i], candidates[j]
+        return a.name == b.name and (a.target is None or b.target is None)
+
+    kinds = [tuple(i for i, a in enumerate(candidates) if a.name == name and a.target is not None) for name in names]
+    return CausePrior(
+        tuple(tuple(columns.of(i)) for i in range(len(candidates))), np.array(weight), exclusive, tuple(kinds)
+    )
 
 
 def _with_model_error(problem: Problem) -> Noise:

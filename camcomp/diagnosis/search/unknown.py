@@ -15,14 +15,14 @@ from camcomp.diagnosis.model.group import NormalEquations
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.diagnosis.statistics.evidence import Prior, estimate
-from camcomp.diagnosis.statistics.score_test import JointProducts, ResidualTest, score_test
+from camcomp.diagnosis.statistics.score_test import JointProducts, Shares, score_test
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
 CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
 
 
-def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, ResidualTest]:
+def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, Shares]:
     """Score test on the residual of a set, per kind of channel; prior: of all other columns."""
     joint = joint_products(problem, f)
     return score_test(joint, *joint.projected(prior, problem.member_columns(f.members)))

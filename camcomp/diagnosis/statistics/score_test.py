@@ -17,16 +17,7 @@ from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Prior, estimate_precision
 from camcomp.ground.datatypes import Floats, Ints
 
-
-@dataclass(frozen=True, eq=False)
-class ResidualTest:
-    """Patterns of one kind of channel: energy beyond chance in units of the kind's noise, and covariates with the share of it
-    that each carries alone, largest first.
-    """
-
-    kind: str
-    energy: float
-    labels: tuple[tuple[str, float], ...]
+Shares = tuple[tuple[str, float], ...]  # covariates with the share that each carries alone, largest first
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,18 +60,21 @@ class JointProducts:
         return self.P - half[:, :-1].T @ half[:, :-1], self.h - half[:, :-1].T @ half[:, -1]
 
 
-def score_test(joint: JointProducts, P: Floats, h: Floats) -> dict[str, ResidualTest]:
-    """Size of the patterns of every kind against chance; P (p, p), h (p,): projected."""
-    out = {}
+def score_test(joint: JointProducts, P: Floats, h: Floats) -> dict[str, Shares]:
+    """Shares of the energy beyond chance of the patterns of every kind of channel, the kind with most of it first.
+
+    P (p, p), h (p,): projected.
+    """
+    found = []
     for kind in dict.fromkeys(joint.kinds):
         mine = np.flatnonzero(np.array(joint.kinds) == kind)
         own, b = P[np.ix_(mine, mine)], h[mine]
-        energy = _explained(own, b, np.arange(len(mine)))
-        out[kind] = ResidualTest(kind, energy, _shares(own, b, [joint.labels[i] for i in mine]))
-    return out
+        found.append((explained(own, b, np.arange(len(mine))), kind, _shares(own, b, [joint.labels[i] for i in mine])))
+    return {kind: shares for _, kind, shares in sorted(found, key=lambda each: -each[0])}
 
 
-def _explained(P: Floats, h: Floats, index: Ints) -> float:
+def explained(P: Floats, h: Floats, index: Ints) -> float:
+    """Energy beyond chance, in units of the noise, of some patterns."""
     if not len(index):
         return 0.0
     size = np.sqrt(np.maximum(np.diag(P)[index], 1e-30))
@@ -89,11 +83,11 @@ def _explained(P: Floats, h: Floats, index: Ints) -> float:
     return max(float(g @ amount) - int(freedom), 0.0)
 
 
-def _shares(P: Floats, h: Floats, labels: Sequence[str]) -> tuple[tuple[str, float], ...]:
+def _shares(P: Floats, h: Floats, labels: Sequence[str]) -> Shares:
     """Energy that the patterns of one covariate carry alone, per covariate, as shares of the largest sum."""
     every = np.array(labels)
-    energy = {name: _explained(P, h, np.flatnonzero(every == name)) for name in dict.fromkeys(labels)}
-    whole = _explained(P, h, np.arange(len(labels)))
+    energy = {name: explained(P, h, np.flatnonzero(every == name)) for name in dict.fromkeys(labels)}
+    whole = explained(P, h, np.arange(len(labels)))
     if whole <= 0.0:
         return ()
     ranked = sorted(energy.items(), key=lambda each: -each[1])

@@ -8,6 +8,7 @@ import pytest
 
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.search import best_of, search_sets
+from camcomp.diagnosis.search.cause_search import rank
 from camcomp.diagnosis.search.fitted_sets import LinearSets
 from camcomp.diagnosis.statistics.cause_sets import (
     SIZES,
@@ -16,7 +17,6 @@ from camcomp.diagnosis.statistics.cause_sets import (
     Scale,
 )
 from camcomp.diagnosis.statistics.evidence import Prior, gram
-from camcomp.diagnosis.statistics.ranking import rank
 
 
 def candidates(n):

@@ -3,20 +3,14 @@
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.model.group import NormalEquations
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Prior
-from camcomp.diagnosis.statistics.score_test import JointProducts, score_test
+from camcomp.diagnosis.statistics.score_test import JointProducts, explained
 
 
 def test_a_pattern_given_twice_counts_once():
     def energy(n):
-        P, names = np.full((n, n), 50.0), tuple("ab"[:n])
-        data = NormalEquations(np.zeros((0, 0)), np.zeros(0), 0.0, 1000)
-        joint = JointProducts(
-            data=data, B=np.zeros((0, n)), h=np.full(n, 40.0), P=P, labels=names, kinds=("tip",) * n, rows=1000.0
-        )
-        return score_test(joint, P, np.full(n, 40.0))["tip"].energy
+        return explained(np.full((n, n), 50.0), np.full(n, 40.0), np.arange(n))
 
     assert energy(2) == pytest.approx(energy(1)) and energy(1) > 0.0
 
