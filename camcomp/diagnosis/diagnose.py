@@ -45,7 +45,7 @@ from camcomp.diagnosis.result.types import (
     Where,
 )
 from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
-from camcomp.diagnosis.search.indistinguishable import classes, likeness
+from camcomp.diagnosis.search.indistinguishable import classes
 from camcomp.diagnosis.search.unexplained import worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.standards import of_runs
@@ -118,7 +118,7 @@ def diagnose(
         shrinkage=shrinkage if unseen else None,
         next_experiment=_proposed(proposal) if proposal is not None else None, minor=minor_effects(stands, best),
         outliers=outliers, floor=Floor(um=gap.noise_floor_um, source=problem.floor.source),
-        equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
+        equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(problem)),
         standards=of_runs(twin, runs),
     ))  # fmt: skip
     return Diagnosis(

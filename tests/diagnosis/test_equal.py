@@ -9,7 +9,7 @@ import pytest
 from camcomp.api.diagnosis import diagnose
 from camcomp.diagnosis.model.group import sum_grams
 from camcomp.diagnosis.next_experiment.designed import propose
-from camcomp.diagnosis.search.indistinguishable import classes, likeness
+from camcomp.diagnosis.search.indistinguishable import classes
 from camcomp.diagnosis.statistics.evidence import gram, misfit
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from tests.diagnosis.conftest import plan_of
@@ -29,7 +29,7 @@ def alternatives(result):
 
 
 def groups(design):
-    candidates = design.problem.columns.candidates
+    candidates = design.columns.candidates
     return [{(candidates[i].name, candidates[i].target) for i in group} for group in classes(design)]
 
 
@@ -70,16 +70,16 @@ def follow(workshop, plan, tmp_path, candidate):
 def test_the_classes_are_known_without_residuals(workshop):
     """The same runs and channels with another fault, or none, have the same classes."""
     design = workshop.answer(LONG)[1].problem
-    there = groups(likeness(design))
+    there = groups(design)
     assert {("tool_length", None), ("workpiece_frame", None)} in there
     for a in "xy":
         assert {("joint_offset", a), ("link_length", a)} in there
-    assert groups(likeness(replace(design, white_residual=[0.0 * r for r in design.white_residual]))) == there
+    assert groups(replace(design, white_residual=[0.0 * r for r in design.white_residual])) == there
 
 
 @pytest.mark.campaign
 def test_an_encoder_tells_a_lag_from_a_late_clock_before_anything_is_measured(workshop):
-    there = groups(likeness(workshop.answer(LONG)[1].problem))
+    there = groups(workshop.answer(LONG)[1].problem)
     assert not any(("servo_lag", None) in group for group in there)
 
 

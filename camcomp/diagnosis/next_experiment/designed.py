@@ -7,7 +7,6 @@ information does not win. The search is deterministic.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from itertools import islice
 
 import numpy as np
@@ -19,11 +18,11 @@ from camcomp.diagnosis.next_experiment.candidates import (
     coarse,
     single_changes,
 )  # fmt: skip
-from camcomp.diagnosis.next_experiment.information_gain import most_narrowed, predicted_gain, program_weight
+from camcomp.diagnosis.next_experiment.information_gain import most_narrowed, predicted_gain
 from camcomp.diagnosis.next_experiment.predicted_logs import Question, predict_logs
 from camcomp.diagnosis.next_experiment.proposal import LEAST_BITS, Proposal, after_unknown
 from camcomp.diagnosis.next_experiment.ready_program import can_be_run
-from camcomp.diagnosis.next_experiment.site import Site, site_of
+from camcomp.diagnosis.next_experiment.site import site_of
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 from camcomp.model.job import Job
@@ -31,31 +30,14 @@ from camcomp.model.job import Job
 MOST_JUDGED_WHOLE = 3  # best designs evaluated with every effect of the library within its tolerance
 
 
-@dataclass(eq=False)
-class Desk:
-    """Evaluation of designs by their information about a question."""
-
-    question: Question
-    site: Site = field(init=False)
-    weight: Floats = field(init=False)
-
-    def __post_init__(self) -> None:
-        problem = self.question.problem
-        self.site = site_of(problem.bench, self.question.job)
-        self.weight = program_weight(problem)
-
-    def judged(self, each: Candidate, *, whole: bool = False) -> Proposal | None:
-        """A candidate with its expected gain; None if it is infeasible or has no gain."""
-        there = predict_logs(self.question, each, whole=whole)
-        if there is None:
-            return None
-        found = predicted_gain(self.question, each, there, self.weight)
-        return Proposal(
-            candidate=each,
-            gain=found.gain,
-            separates=separated(self.question.problem, self.question.rivals),
-            told=found,
-        )
+def judged(question: Question, each: Candidate, *, whole: bool = False) -> Proposal | None:
+    """A candidate with its expected information about a question; None if it is infeasible or has no gain."""
+    there = predict_logs(question, each, whole=whole)
+    if there is None:
+        return None
+    found = predicted_gain(question, each, there, question.weight)
+    separates = separated(question.problem, question.rivals)
+    return Proposal(candidate=each, gain=found.gain, separates=separates, told=found)
 
 
 def separated(problem: Problem, rivals: Sequence[Fitted]) -> tuple[str, ...]:
@@ -69,23 +51,23 @@ def propose(problem: Problem, rivals: Sequence[Fitted], probability: Floats, job
     """The best next experiment to separate fitted sets of causes; None if all tell less than it costs to set one up."""
     if not any(f.members for f in rivals):
         return None
-    desk = Desk(Question(problem, rivals, probability, job))
-    if len(rivals) == 1 and most_narrowed(desk.question, desk.weight) <= LEAST_BITS:
+    question = Question(problem, rivals, probability, job)
+    if len(rivals) == 1 and most_narrowed(question, question.weight) <= LEAST_BITS:
         return None
-    found = ranked(desk, (*coarse(desk.site), *by_other_means(desk.site)))
+    found = ranked(question, (*coarse(question.site), *by_other_means(question.site)))
     bench = problem.bench
     can = (each for each in found if can_be_run(each.candidate, bench.runs, job, bench.twin))
-    whole = [desk.judged(each.candidate, whole=True) for each in islice(can, MOST_JUDGED_WHOLE)]
+    whole = [judged(question, each.candidate, whole=True) for each in islice(can, MOST_JUDGED_WHOLE)]
     worth = [each for each in whole if each is not None and each.tells]
     return max(worth, key=lambda each: each.value, default=None)
 
 
-def ranked(desk: Desk, tried: Iterable[Candidate]) -> list[Proposal]:
+def ranked(question: Question, tried: Iterable[Candidate]) -> list[Proposal]:
     """Candidates that tell more than it costs to set one up, best first."""
-    names = separated(desk.question.problem, desk.question.rivals)
+    names = separated(question.problem, question.rivals)
     useful = (each for each in tried if all(effect in names for effect, *_ in each.knows))
-    judged = (desk.judged(each) for each in useful if desk.site.holds(each.design.points()))
-    found = [each for each in judged if each is not None and each.tells]
+    every = (judged(question, each) for each in useful if question.site.holds(each.design.points()))
+    found = [each for each in every if each is not None and each.tells]
     return sorted(found, key=lambda each: -each.value)
 
 

@@ -18,7 +18,8 @@ from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import LARGE
 from camcomp.diagnosis.next_experiment.candidates import Candidate
-from camcomp.diagnosis.next_experiment.information_gain import seen_apart
+from camcomp.diagnosis.next_experiment.information_gain import program_weight, seen_apart
+from camcomp.diagnosis.next_experiment.site import Site, site_of
 from camcomp.diagnosis.search.indistinguishable import HIDDEN
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
@@ -64,6 +65,16 @@ class Question:
             covariance[index, index] += (HIDDEN / LARGE * f.theta) ** 2
             out.append((mean, covariance))
         return tuple(out)
+
+    @cached_property
+    def site(self) -> Site:
+        """The regions of the runs and of feasible experiments."""
+        return site_of(self.problem.bench, self.job)
+
+    @cached_property
+    def weight(self) -> Floats:
+        """What the columns of causes do to the tip in the runs' programs."""
+        return program_weight(self.problem)
 
     @cached_property
     def shapes(self) -> dict[int, dict[str, float]]:

@@ -26,7 +26,7 @@ from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes
 from camcomp.diagnosis.fit.open_problem import open_problem
 from camcomp.diagnosis.next_experiment.design import MotionDesign
-from camcomp.diagnosis.next_experiment.designed import Desk, propose
+from camcomp.diagnosis.next_experiment.designed import propose
 from camcomp.diagnosis.next_experiment.predicted_logs import Question
 from tests.validation import runner
 from tests.validation.plants.causes import Cause
@@ -127,7 +127,7 @@ def told_of_two(square: float) -> float:
     return float(1.0 - np.sum(weight * np.logaddexp(0.0, -log_odds)) / np.sum(weight) / np.log(2.0))
 
 
-def opened_question(folder: Path, world: World) -> Desk:
+def opened_question(folder: Path, world: World) -> Question:
     """What camcomp makes of the files of a world, asked about the two causes."""
     opened = open_experiment(write(world.made, world.plan, folder, runner.CONFIG))
     bench = Bench(twin=opened.twin, runs=opened.runs)
@@ -135,13 +135,13 @@ def opened_question(folder: Path, world: World) -> Desk:
     problem = open_problem(bench, causes)
     names = [(world.plan.causes[0].effect, world.plan.causes[0].target), (world.other.effect, world.other.target)]
     at = [next(i for i, c in enumerate(problem.columns.candidates) if (c.name, c.target) == name) for name in names]
-    return Desk(Question(problem, [problem.refit((i,)) for i in at], np.array([0.5, 0.5]), opened.job))
+    return Question(problem, [problem.refit((i,)) for i in at], np.array([0.5, 0.5]), opened.job)
 
 
-def random_designs(desk: Desk, count: int, seed: int) -> list[MotionDesign]:
+def random_designs(question: Question, count: int, seed: int) -> list[MotionDesign]:
     """Designs that the machine can do, drawn evenly over place, plane, radius, feed, direction and load."""
     rng = np.random.default_rng(seed)
-    site, out = desk.site, []
+    site, out = question.site, []
     while len(out) < count:
         feed = site.work.feed * 4.0 ** rng.uniform(-1.0, 1.0)
         turns = [(1,), (-1,), (1, -1)][rng.integers(3)]
@@ -167,14 +167,14 @@ def random_designs(desk: Desk, count: int, seed: int) -> list[MotionDesign]:
                 turns=turns,
                 along=line,
             )
-        if allowed(desk, design):
+        if allowed(question, design):
             out.append(design.tidy())
     return out
 
 
-def every_design(desk: Desk, steps: int) -> list[MotionDesign]:
+def every_design(question: Question, steps: int) -> list[MotionDesign]:
     """A grid over places (steps each way), planes, radii, feeds, lines, and cuts."""
-    site, out = desk.site, []
+    site, out = question.site, []
     at = np.linspace(-0.9, 0.9, steps) * site.farther
     up = np.linspace(0.0, 0.9, (steps + 1) // 2) * site.farther
     feeds = site.work.feed * np.array([0.5, 1.5] if steps > 3 else [0.7])
@@ -195,12 +195,14 @@ def every_design(desk: Desk, steps: int) -> list[MotionDesign]:
                 centre=tuple(site.cut.centre), radius=share * site.cut.radius, feed=feed * site.cut.feed, cutting=True
             )
         )
-    return [each.tidy() for each in out if allowed(desk, each)]
+    return [each.tidy() for each in out if allowed(question, each)]
 
 
-def allowed(desk: Desk, design: MotionDesign) -> bool:
+def allowed(question: Question, design: MotionDesign) -> bool:
     """Whether the machine can run it without a collision."""
-    return desk.site.holds(design.points()) and (design.cutting or design.points()[:, 2].min() >= desk.site.low - 0.05)
+    return question.site.holds(design.points()) and (
+        design.cutting or design.points()[:, 2].min() >= question.site.low - 0.05
+    )
 
 
 def world_of(question, seed: int = 61) -> World:
@@ -213,12 +215,11 @@ def world_of(question, seed: int = 61) -> World:
 def compare(question, folder: Path, *, steps: int, random: int) -> dict[str, float]:
     """Values of what camcomp designs, of random designs in the mean, of the best of a grid."""
     world = world_of(question)
-    desk = opened_question(folder, world)
-    asked = desk.question
+    asked = opened_question(folder, world)
     chosen = propose(asked.problem, asked.rivals, asked.probability, asked.job)
     assert chosen is not None and not chosen.candidate.knows
-    by_chance = [world.value(each) for each in random_designs(desk, random, 5)]
-    grid = every_design(desk, steps)
+    by_chance = [world.value(each) for each in random_designs(asked, random, 5)]
+    grid = every_design(asked, steps)
     values = [world.value(each) for each in grid]
     best = int(np.argmax(values))
     return {
