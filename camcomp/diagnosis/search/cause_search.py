@@ -50,8 +50,8 @@ class RankedSets:
         return self.fits[self.first]
 
 
-def rank(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Members, Members]]) -> RankedSets:
-    """The ranking of fits by their probabilities; twins: pairs of sets that the data cannot tell apart.
+def rank(fits: Sequence[Fitted], probability: Floats, twins: Sequence[Members]) -> RankedSets:
+    """The ranking of fits by their probabilities; twins: sets that the data cannot tell from the best one.
 
     Twins of the best set and itself have equal parts of their common probability: neither a prior nor other sets break that tie.
     """
@@ -61,7 +61,7 @@ def rank(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Memb
     rivals, twin = list[int](), [best]
     for j in order[1:] if leader.members else ():
         members = fits[j].members
-        same = (leader.members, members) in twins or (members, leader.members) in twins
+        same = members in twins
         near = np.log(max(probability[best], 1e-300) / max(probability[j], 1e-300)) < EQUAL_LOG_ODDS
         # a set with a superfluous member, or one too few, is no rival but the same answer less well put
         nested = set(members) >= set(leader.members) or set(members) <= set(leader.members)
@@ -224,8 +224,8 @@ def _modelled(problem: Problem, f: Fitted) -> float:
     return min(MODELLED * max(together, *alone, 0.0), LEFT_OPEN * together)
 
 
-def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[tuple[Members, Members]]:
-    """Pairs of the best set and a set of its size that fits as well, whatever the priors say of them.
+def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[Members]:
+    """Sets of the size of the best one that fit as well, whatever the priors say of them.
 
     Priors of sizes, and of how far off the tolerances are all together: the rows and the stated tolerances have to tell.
     """
@@ -243,5 +243,5 @@ def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[tupl
             continue
         behind = 0.5 * (left(f) - left(best))
         if min(behind, best.log_evidence - f.log_evidence) < EQUAL_LOG_ODDS and of_their_signs(f):
-            found.append((best.members, f.members))
+            found.append(f.members)
     return found

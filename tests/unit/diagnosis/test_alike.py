@@ -38,7 +38,7 @@ def problem_of(twin):
 def test_an_unusual_size_alone_excludes_no_set():
     problem, fits = problem_of(twin=1.0)
     assert fits[0].log_evidence - fits[1].log_evidence > EQUAL_LOG_ODDS
-    assert _same(problem, fits, fits[0]) == [((0,), (1,))]
+    assert _same(problem, fits, fits[0]) == [(1,)]
 
 
 def test_rows_that_follow_another_set_worse_exclude_it():
