@@ -23,6 +23,7 @@ from camcomp.diagnosis.arm.poses import LEAST_POSES, ArmBench, Poses, combined
 from camcomp.diagnosis.arm.temporary_offsets import EFFECT as SPELL
 from camcomp.diagnosis.arm.temporary_offsets import temporary_offsets
 from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrinkage, unseen_poses, without_far_judged
+from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.discrepancy import residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.explain import STATED, Explanation, KnownNoise, explain
@@ -179,10 +180,10 @@ def with_temporary_offsets(bench: ArmBench, shelf: Shelf, found: Explanation) ->
     out = shelf
     for members in dict.fromkeys(((), found.members)):
         rest = [r * model.groups[k].sd for k, r in enumerate(residuals(model, Background(), members))]
-        columns, own = temporary_offsets(bench, rest, frames, joints, len(out.columns))
-        new = [k for k, column in enumerate(columns) if column not in out.columns]
-        own = [replace(own[k], columns=(len(out.columns) + i,)) for i, k in enumerate(new)]
-        out = out.with_more([columns[k] for k in new], own)
+        offsets = temporary_offsets(bench, rest, frames, joints)
+        new = [(column, ways) for column, ways in offsets if column not in out.columns]
+        own = [PlacedCause(SPELL, c.target, (k,), ways) for k, (c, ways) in enumerate(new, len(out.columns))]
+        out = out.with_more([column for column, _ in new], own)
     return out
 
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from camcomp.diagnosis.arm.poses import ArmBench, Column
-from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.folds import without_nuisances
 from camcomp.diagnosis.model.noise import IN_A_ROW
 from camcomp.diagnosis.model.window import best_window
@@ -18,15 +17,15 @@ EFFECT = "disturbance"
 
 
 def temporary_offsets(
-    bench: ArmBench, rest: Sequence[Floats], frames: Sequence[Floats], joints: Sequence[Floats], first: int
-) -> tuple[list[Column], list[PlacedCause]]:  # fmt: skip
-    """Columns and candidates, one per joint and campaign. rest (n, 3) mm: what is left beside the nuisances frames (n, 3, 9).
+    bench: ArmBench, rest: Sequence[Floats], frames: Sequence[Floats], joints: Sequence[Floats]
+) -> list[tuple[Column, float]]:
+    """Columns, one per joint and campaign, each with the number of windows it is the best of.
 
-    joints (n, 3, m): motion of the tip per rad (mm) of every joint; first: index of the first of these columns.
+    rest (n, 3) mm: what is left beside the nuisances frames (n, 3, 9). joints (n, 3, m): motion of the tip per rad (mm) of
+    every joint.
     """
     module = shelf.load("effects", EFFECT)
-    columns: list[Column] = []
-    found: list[PlacedCause] = []
+    found: list[tuple[Column, float]] = []
     for k in bench.own:
         poses = bench.campaigns[k]
         order = np.argsort(poses.time, kind="stable")
@@ -45,9 +44,8 @@ def temporary_offsets(
             shape = tuple((name, *edge) for name, edge in zip(names, edges, strict=True))
             own = getattr(module, "ROTARY", module.PARAMETERS) if drive.revolute else module.FITTED
             parameter = next(p for p in own if p.name.startswith("shift"))
-            columns.append(Column(EFFECT, drive.name, module, parameter, shape))
-            found.append(PlacedCause(EFFECT, drive.name, (first + len(found),), 0.5 * n * n * len(bench.own)))
-    return columns, found
+            found.append((Column(EFFECT, drive.name, module, parameter, shape), 0.5 * n * n * len(bench.own)))
+    return found
 
 
 def _between(time: Floats, k: int) -> tuple[float, float, float]:

@@ -44,28 +44,14 @@ class AxisRows(TermRows):
     def __init__(
         self, name: str, channel: AxisChannel, moves: Sequence[AxisTravel], *, force: bool, held: bool = False
     ) -> None:
-        self.spot, self._name, self.moves = Spot("force" if force else "control", 0), name, moves
+        self.spot, self.moves = Spot("force" if force else "control", 0), moves
         self.left = [each if force else -each for each in channel.left]  # set-point minus encoder is what is studied
-        self.floor, self._size = channel.floor, float(np.sqrt(np.mean(channel.rows**2)))
+        self.floor, self.wide = channel.floor, float(np.sqrt(np.mean(channel.rows**2)))
+        self.actuators, self.row_counts = (name,), [len(each) for each in self.left]
         self.noise = noise_of(np.concatenate(self.left), channel.floor)
         size = np.sqrt(np.mean(channel.columns**2, axis=0)) + 1e-300
         self._taken, self._held = np.linalg.qr(channel.columns / size)[0], held
         self._base = np.split(channel.columns / size, np.cumsum(self.row_counts)[:-1])
-
-    @property
-    def actuators(self) -> Sequence[str]:
-        """The axis alone."""
-        return (self._name,)
-
-    @property
-    def wide(self) -> float:
-        """Size of the channel."""
-        return self._size
-
-    @property
-    def row_counts(self) -> Sequence[int]:
-        """Rows of every run."""
-        return [len(each) for each in self.left]
 
     def unit(self, spot: Spot) -> str:
         """Of the channel."""

@@ -11,7 +11,6 @@ from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
 from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
 from camcomp.diagnosis.fit.patterns import KINDS, Dictionary
-from camcomp.diagnosis.fit.small_forces import bent_farther
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.model.group import NormalEquations, sum_grams
 from camcomp.diagnosis.model.noise import MINOR
@@ -24,7 +23,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.errors import PhysicsError
 from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.twin import Reading
-from camcomp.model.signal_path import stages_of
+from camcomp.model.signal_path import pushes, stages_of
 
 SETTLED = 0.05  # chi-square that one more pass may cost
 FARTHER = 10  # further passes for shapes that are on their way from where they were scanned
@@ -399,3 +398,21 @@ class Problem:
                 high = longest(self.bench, self.columns.candidates[i], p)
                 shapes[i][p.name] = float(np.clip(shapes[i][p.name] + s, p.low, max(high, p.low)))
         return moves, whole < 1.0 and moves > INDISTINGUISHABLE
+
+
+def bent_farther(columns: Columns, members: Sequence[int], causes: Sequence[Cause]) -> Floats:
+    """How many times as far as at nominal the forces of other candidates bend the machine that the causes make: (k,) >= 1.
+
+    Friction that every healthy guide has bends a screw that is six times as soft as stated six times as far.
+    """
+    out = np.ones(len(columns.names))
+    for i, cause in zip(members, causes, strict=True):
+        p = columns.candidates[i].parameters[0]
+        if not p.log or "structure" not in stages_of(cause.effect):
+            continue
+        for j, each in enumerate(columns.candidates):
+            loads = pushes(each.effect) and not any(shape.placed for shape in each.shapes)
+            if j not in members and loads and (each.target in (cause.target, None) or cause.target is None):
+                own = columns.of(j)
+                out[own] = np.maximum(out[own], p.nominal / cause.values[p.name])
+    return out

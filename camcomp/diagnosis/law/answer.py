@@ -11,10 +11,9 @@ from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import TermBench, spots
 from camcomp.diagnosis.law.describe import law_result, moved_without
-from camcomp.diagnosis.law.find import BETTER, FoundLaw, find_law
+from camcomp.diagnosis.law.find import BETTER, FoundLaw, find_law, find_map
 from camcomp.diagnosis.law.folds import Folds, Split, usual_split
 from camcomp.diagnosis.law.screen import term_grids
-from camcomp.diagnosis.law.smooth import find_map
 from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.result.types import Law
 from camcomp.diagnosis.search.unknown import firm_prior

@@ -54,26 +54,19 @@ def spots(actuators: int, kind: str) -> list[Spot]:
 
 
 class TermRows(ABC):
-    """Evaluates terms on rows of runs, whatever channels show them."""
+    """Evaluates terms on rows of runs, whatever channels show them.
 
-    @property
-    @abstractmethod
-    def actuators(self) -> Sequence[str]:
-        """Names in order."""
+    actuators: names in order. row_counts: rows of every run. wide: size of these channels, standard deviation of what a law
+    may move them by, before any data.
+    """
 
-    @property
-    @abstractmethod
-    def wide(self) -> float:
-        """Size of these channels: standard deviation of what a law may move them by, before any data."""
+    actuators: Sequence[str]
+    row_counts: Sequence[int]
+    wide: float
 
     @abstractmethod
     def unit(self, spot: Spot) -> str:
         """Of what a law does at a spot."""
-
-    @property
-    @abstractmethod
-    def row_counts(self) -> Sequence[int]:
-        """Rows of every run."""
 
     @abstractmethod
     def rows(self, spot: Spot) -> Sequence[Mapping[str, Floats]]:
@@ -125,27 +118,14 @@ class TermBench(TermRows):
         self._rows: dict[tuple[str, int], list[Rows]] = {}
         self._squares: dict[Spot, list[Floats]] = {}
         self._reaches: dict[tuple[Spot, int], tuple[list[int], Floats]] = {}
-
-    @cached_property
-    def wide(self) -> float:
-        """Size of the gap of the tip, mm (rms of a coordinate)."""
-        gaps = np.concatenate([self.bench.gap(k)[:, :3].ravel() for k in range(len(self.bench.runs))])
-        return float(np.sqrt(np.nanmean(gaps**2)))
-
-    @property
-    def actuators(self) -> Sequence[str]:
-        """Names in order."""
-        return self.bench.actuators
+        self.actuators, self.row_counts = bench.actuators, [len(run.run_path.time) for run in bench.runs]
+        gaps = np.concatenate([bench.gap(k)[:, :3].ravel() for k in range(len(bench.runs))])
+        self.wide = float(np.sqrt(np.nanmean(gaps**2)))  # of a coordinate of the tip, mm
 
     def unit(self, spot: Spot) -> str:
         """Of what a law does at a spot."""
         hinge = spot.on in ("control", "drive") and self.bench.twin.robot.actuators[spot.index].revolute
         return "rad" if hinge else "mm"
-
-    @property
-    def row_counts(self) -> Sequence[int]:
-        """Rows of every run."""
-        return [len(run.run_path.time) for run in self.bench.runs]
 
     def rows(self, spot: Spot) -> Sequence[Rows]:
         """Covariates per run where the spot is."""

@@ -13,9 +13,9 @@ from itertools import combinations
 
 import numpy as np
 
-from camcomp.diagnosis.law.bench_terms import Term, TermRows
+from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, TermRows, spots
 from camcomp.diagnosis.law.folds import ALTERNATING, Folds, RunColumns, Split, gains, usual_split, withheld
-from camcomp.diagnosis.law.forms import Form, SmoothForm
+from camcomp.diagnosis.law.forms import Form, Sizes, SmoothForm
 from camcomp.diagnosis.law.screen import Screen, TermGrid
 from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.model.noise import MINOR
@@ -24,6 +24,8 @@ from camcomp.ground.datatypes import Floats
 
 MOST_TERMS = 6
 BETTER = 0.9  # of what the causes or a law leave on withheld parts: a law, or another one, has to leave less
+BOTH = 6  # splines over each of two covariates; twice as many over a single one
+_SINGLE = ("heading_rad", "temp_C", "cut_min", "fx_N", "fy_N", "fz_N")  # covariates of a map by themselves
 REFINED = 7  # kinds of terms whose shapes are followed at every step
 CONSTANT = Form(family="constant", about=(), texts=("1",), units=("",))
 _PLAIN = ("line", "power", "product", "rate", "force")  # simpler kinds of the same value come first
@@ -239,3 +241,39 @@ def unlikely(term: Term) -> bool:
     """
     own = term.form.family == "while" or term.form.about[0].startswith(("act", *"xyz"))
     return (term.spot.on == "drive") != own
+
+
+def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundLaw | None:
+    """The smooth maps that the residual of a kind of channel follows: cubic splines over one or two covariates.
+
+    Covariates and spots make withheld parts most probable, one spot after the other; None where none gains EQUAL_LOG_ODDS.
+    """
+    where, shapes, step = spots(len(bench.bench.actuators), kind), Shapes(bench), folds
+    chosen: list[Term] = []
+    while len(chosen) < len(where):
+        best: tuple[float, Term] | None = None
+        for spot in [s for s in where if all(s != each.spot for each in chosen)]:
+            size = bench.sizes(spot)
+            for names in _covariates(spot, size):
+                counts = (2 * BOTH,) if len(names) == 1 else (BOTH, BOTH)
+                form = SmoothForm(about=names, limits=tuple(size.limits[n] for n in names), counts=counts)
+                white, precision = shapes.columns(Term(spot, form))
+                gain = withheld(gains(*step.together([white]), precision))
+                if best is None or gain > best[0]:
+                    best = gain, Term(spot, form)
+        if best is None or best[0] < EQUAL_LOG_ODDS:
+            break
+        chosen.append(best[1])
+        found = fitted(shapes, chosen, folds)
+        step = folds.extended(found.columns, found.precision)
+    return found if chosen else None
+
+
+def _covariates(spot: Spot, size: Sizes) -> list[tuple[str, ...]]:
+    if spot.on in ("control", "drive"):
+        return [
+            (name,) for name in ("act_mm", "act_rad", "temp_C", "cut_min")[: 1 if size.limits else 0] if size.wide(name)
+        ]
+    axes = [f"{a}_mm" for a in "xyz" if size.wide(f"{a}_mm")]
+    pairs = [(a, b) for i, a in enumerate(axes) for b in axes[i + 1 :]]
+    return [*pairs, *((a,) for a in axes), *((name,) for name in _SINGLE if size.wide(name))]

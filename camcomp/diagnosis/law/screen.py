@@ -27,7 +27,13 @@ def term_grids(bench: TermBench, kind: str) -> list[TermGrid]:
     every = spots(len(bench.bench.actuators), kind)
     tip = tuple(each for each in every if each.on == "structure")
     groups = [each for each in (tip, *((each,) for each in every if each not in tip)) if each]
-    return grids_of([(where, _forms(bench, where[0])) for where in groups])
+
+    def forms(spot: Spot) -> Sequence[Form]:
+        size = bench.sizes(spot)
+        revolute = spot.on != "structure" and bench.bench.twin.robot.actuators[spot.index].revolute
+        return at_tip(size) if spot.on == "structure" else at_drive(size, revolute)
+
+    return grids_of([(where, forms(where[0])) for where in groups])
 
 
 def grids_of(tried: Sequence[tuple[tuple[Spot, ...], Sequence[Form]]]) -> list[TermGrid]:
@@ -37,13 +43,6 @@ def grids_of(tried: Sequence[tuple[tuple[Spot, ...], Sequence[Form]]]) -> list[T
         for where, forms in tried
         for count in sorted({f.size for f in forms})
     ]
-
-
-def _forms(bench: TermBench, spot: Spot) -> Sequence[Form]:
-    size = bench.sizes(spot)
-    if spot.on in ("control", "drive"):
-        return at_drive(size, bench.bench.twin.robot.actuators[spot.index].revolute)
-    return at_tip(size)
 
 
 class Screen:

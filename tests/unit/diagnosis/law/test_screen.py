@@ -1,7 +1,5 @@
 """All terms at once: in parts as all together, and rows of several runs as each run alone."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -42,7 +40,6 @@ class Runs(TermBench):
     wide = 0.2
 
     def __init__(self):
-        super().__init__(SimpleNamespace(), None, [], [])
         t = np.linspace(0.0, 9.0, Rows.rows)
         self.runs = [Rows(x_mm=20.0 * np.sin(t)), Rows(x_mm=25.0 - 30.0 * np.cos(1.3 * t))]
         self.runs[0]["x_mm"][0] = 0.0
