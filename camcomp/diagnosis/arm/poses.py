@@ -211,11 +211,8 @@ class ArmBench:
                 own = _for(module, self.drive(target or self.actuators[0]).revolute)
                 shapes: list[EffectShape] = [()]
                 if scanned := any(p.scan for p in own):
-                    shapes = (
-                        _shapes(own, self._warm)
-                        if timed and (hasattr(module, "on_drive") or hasattr(module, "on_links"))
-                        else []
-                    )
+                    of_arm = hasattr(module, "on_drive") or hasattr(module, "on_links")
+                    shapes = _shapes(own, self._warm) if timed and of_arm else []
                 found += [Column(name, target, module, p, s) for s in shapes for p in own if not (scanned and p.shape)]
         return found
 

@@ -125,11 +125,10 @@ def axis_law(
     before, after = (1e-3 * each for each in (law.before_rms_um, law.after_rms_um))
     says = f"{law.says} The drive force of {name} goes from {before:.3g} N to {after:.3g} N (rms)."
     if second is None:  # the gap itself does not show it
-        size = (
-            None if following is None else round(1e3 * float(np.sqrt(np.mean(np.concatenate(following.left) ** 2))), 3)
-        )
-        unchanged = {} if size is None else dict.fromkeys(("before_rms_um", "after_rms_um"), size)
-        return law.model_copy(update={"says": says, **unchanged})
+        if following is None:
+            return law.model_copy(update={"says": says})
+        size = round(1e3 * float(np.sqrt(np.mean(np.concatenate(following.left) ** 2))), 3)
+        return law.model_copy(update={"says": says, "before_rms_um": size, "after_rms_um": size})
     return second.model_copy(
         update={
             "formula": f"{law.formula}; {second.formula}", "on": law.on, "terms": (*law.terms, *second.terms),
