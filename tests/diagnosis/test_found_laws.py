@@ -11,10 +11,10 @@ from camcomp.diagnosis.fit.bench import Bench, CandidateCause
 from camcomp.diagnosis.fit.open_problem import open_problem
 from camcomp.diagnosis.law.answer import _base, answer_law, fit_needed, term_bench, with_law
 from camcomp.diagnosis.law.bench_terms import Spot, Term
-from camcomp.diagnosis.law.folds import usual_split
 from camcomp.diagnosis.law.forms import at_tip
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.law.shapes import Shapes
+from camcomp.diagnosis.statistics.folds import usual_split
 from camcomp.ground import shelf
 from camcomp.model.effect import Cause
 from camcomp.model.law.covariates import AT_DRIVE

@@ -17,13 +17,13 @@ from camcomp.diagnosis.axis.terms import AxisTravel, ripple
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermRows
 from camcomp.diagnosis.law.describe import law_result
 from camcomp.diagnosis.law.find import BETTER, FoundLaw, find_law, fitted, strengths
-from camcomp.diagnosis.law.folds import Folds, RunColumns, Split, usual_split
 from camcomp.diagnosis.law.forms import HARD_MM, Form, at_drive
 from camcomp.diagnosis.law.screen import grids_of
 from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.result.types import Law
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.folds import Folds, RunColumns, Split, usual_split
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 from camcomp.model.law.covariates import REFERENCE_C

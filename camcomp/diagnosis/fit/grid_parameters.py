@@ -9,9 +9,9 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, means
 from camcomp.diagnosis.fit.columns import shape_default
-from camcomp.diagnosis.law.folds import Folds
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS
+from camcomp.diagnosis.statistics.folds import Folds
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Parameter

@@ -23,14 +23,14 @@ from camcomp.diagnosis.fit.noise import inflation, instrument_noise
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.law.folds import Folds, Split
 from camcomp.diagnosis.model.evidence import ABSENT
-from camcomp.diagnosis.model.group import sum_grams
 from camcomp.diagnosis.model.noise import HEALTHY, MINOR
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior
 from camcomp.diagnosis.statistics.evidence import estimate
+from camcomp.diagnosis.statistics.folds import Folds, Split
 from camcomp.diagnosis.statistics.noise_model import Noise
+from camcomp.diagnosis.statistics.normal_equations import sum_grams
 from camcomp.ground.datatypes import Floats
 
 

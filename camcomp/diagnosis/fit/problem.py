@@ -12,12 +12,12 @@ from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
 from camcomp.diagnosis.fit.patterns import KINDS, Dictionary
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
-from camcomp.diagnosis.model.group import NormalEquations, sum_grams
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale
 from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
+from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.errors import PhysicsError

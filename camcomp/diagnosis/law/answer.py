@@ -12,7 +12,6 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import TermBench, spots
 from camcomp.diagnosis.law.describe import law_result, moved_without
 from camcomp.diagnosis.law.find import BETTER, FoundLaw, find_law, find_map
-from camcomp.diagnosis.law.folds import Folds, Split, usual_split
 from camcomp.diagnosis.law.screen import term_grids
 from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.result.types import Law
@@ -20,6 +19,7 @@ from camcomp.diagnosis.search.unknown import firm_prior
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, temperature_of
 from camcomp.diagnosis.statistics.evidence import FREE, Prior
+from camcomp.diagnosis.statistics.folds import Folds, Split, usual_split
 from camcomp.ground.datatypes import Floats
 
 

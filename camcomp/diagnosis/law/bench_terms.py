@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, means, thinned
-from camcomp.diagnosis.law.folds import RunColumns
 from camcomp.diagnosis.law.forms import Form, Sizes, SmoothForm, sizes
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.folds import RunColumns
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Load

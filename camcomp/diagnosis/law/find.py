@@ -14,11 +14,11 @@ from itertools import combinations
 import numpy as np
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, TermRows, spots
-from camcomp.diagnosis.law.folds import ALTERNATING, Folds, RunColumns, Split, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import Form, Sizes, SmoothForm
 from camcomp.diagnosis.law.screen import Screen, TermGrid
 from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.model.noise import MINOR
+from camcomp.diagnosis.statistics.folds import ALTERNATING, Folds, RunColumns, Split, gains, usual_split, withheld
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, TermRows, spots
-from camcomp.diagnosis.law.folds import Folds, Products, RunColumns, gains
 from camcomp.diagnosis.law.forms import Form, at_drive, at_tip
+from camcomp.diagnosis.statistics.folds import Folds, Products, RunColumns, gains
 from camcomp.ground.datatypes import Floats
 
 KEPT_BYTES = 400e6  # of white columns that are kept; more are worked out anew at every step

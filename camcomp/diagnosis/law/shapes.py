@@ -8,8 +8,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermRows
-from camcomp.diagnosis.law.folds import Folds, RunColumns, gains
 from camcomp.diagnosis.law.forms import Form, SmoothForm
+from camcomp.diagnosis.statistics.folds import Folds, RunColumns, gains
 from camcomp.ground.datatypes import Floats
 
 INSTANTS = 60  # moments between rows that are tried for a beginning and for an end, twice in turn

@@ -17,6 +17,7 @@ from camcomp.ground.datatypes import Floats
 
 INDISTINGUISHABLE = 9.0  # chi-square of what another set leaves of the effect: three deviations
 LARGE = 10.0  # size of an effect, in units of the noise, up to which an answer has to be right
+HIDDEN = 0.2  # difference of two effects at that size, in units of the noise, below which they are indistinguishable
 MOST_SETS = 4  # contract: alternatives that are listed
 
 

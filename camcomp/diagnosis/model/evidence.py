@@ -22,13 +22,12 @@ from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
 from camcomp.diagnosis.model.group import (
     ColumnLayout,
     Group,
-    NormalEquations,
     SmoothProcess,
     normal_equations,
-    sum_grams,
 )
 from camcomp.diagnosis.model.noise import HEALTHY
 from camcomp.diagnosis.statistics.cause_sets import SIZES
+from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
 from camcomp.ground.datatypes import Floats, Ints
 
 WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: effect of a cause on the channels

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
+from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.ground.datatypes import Floats, Ints
 
 
@@ -133,17 +134,6 @@ class ColumnLayout:
         return D
 
 
-@dataclass(frozen=True, eq=False)
-class NormalEquations:
-    """Normal equations of white rows: A = D'D (q, q), b = D'y (q,), c = y'y, number of values, log of the noise sizes."""
-
-    A: Floats
-    b: Floats
-    c: float
-    rows: int
-    log_size: float = 0.0
-
-
 def normal_equations(
     g: Group, layout: ColumnLayout, process: SmoothProcess | None = None, columns: Ints | None = None
 ) -> NormalEquations:
@@ -153,15 +143,6 @@ def normal_equations(
     white = g.whiten(D, process)
     own, y = white[:, :-1], white[:, -1]
     return NormalEquations(own.T @ own, own.T @ y, float(y @ y), int(np.isfinite(g.y).sum()), g.log_size(process))
-
-
-def sum_grams(grams: Sequence[NormalEquations]) -> NormalEquations:
-    """Normal equations of several groups together."""
-    A, b = grams[0].A.copy(), grams[0].b.copy()
-    for g in grams[1:]:  # in place: a stack of many groups would be large
-        A += g.A
-        b += g.b
-    return NormalEquations(A, b, sum(g.c for g in grams), sum(g.rows for g in grams), sum(g.log_size for g in grams))
 
 
 def split_regions(positions: Floats, count: int) -> np.ndarray:

@@ -13,20 +13,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.classes import LARGE
-from camcomp.diagnosis.search.indistinguishable import HIDDEN
+from camcomp.diagnosis.model.classes import HIDDEN, LARGE
+from camcomp.diagnosis.next_experiment.candidates import Candidate
+from camcomp.diagnosis.next_experiment.predicted_logs import PredictedLogs, Question, seen_apart
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.probability import SEED, TEMPERATURE
 from camcomp.ground.datatypes import Floats
-
-if TYPE_CHECKING:
-    from camcomp.diagnosis.next_experiment.candidates import Candidate
-    from camcomp.diagnosis.next_experiment.predicted_logs import PredictedLogs, Question
 
 _OUTCOME_DRAWS = 64
 
@@ -56,7 +52,7 @@ class ExpectedGain:
 
 
 def predicted_gain(question: Question, candidate: Candidate, there: PredictedLogs, weight: Floats) -> ExpectedGain:
-    """Expected information of a predicted candidate. weight: (k, k) of `program_weight`."""
+    """Expected information of a predicted candidate. weight: (k, k) of the question."""
     problem, rivals, probability = question.problem, question.rivals, question.probability
     kinds = [k for k in candidate.channels if k in there.signals]
     columns = np.concatenate([there.columns[k] for k in kinds])
@@ -103,18 +99,6 @@ def most_narrowed(question: Question, weight: Floats) -> float:
     return 0.5 * float(np.log2((float(np.dot(question.probability, each)) + noise) / noise))
 
 
-def program_weight(problem: Problem) -> Floats:
-    """Mean over all rows (k, k) of tip' tip, mm2, for the effect of every column of a cause on the tip in the runs' programs.
-
-    Errors of the drives count with their displacement of the tip; workpiece frame and clock are no errors of the machine.
-    """
-    machine = problem.columns.candidate >= 0
-    for i, each in enumerate(problem.columns.candidates):
-        if each.effect.STAGE in ("workpiece", "sensor"):
-            machine[problem.columns.of(i)] = False
-    return np.asarray(problem.tip_gram * np.outer(machine, machine))
-
-
 def _by_other_means(problem: Problem, truth: Fitted, other: Fitted, candidate: Candidate) -> float:
     """Chi-square between the values of two rivals for the parameters that the candidate measures directly."""
     out = 0.0
@@ -137,15 +121,6 @@ def expected_gain(apart: Floats, probability: Floats) -> float:
         weight = np.exp(logs - logs.max(axis=1, keepdims=True))
         after += p * float(np.mean([_entropy(w / w.sum()) for w in weight]))
     return max(_entropy(probability) - float(after), 0.0)
-
-
-def seen_apart(signals: Floats, left: Floats, hidden: float, large: float) -> float:
-    """Chi-square of white rows `left` (w,) beyond the model error of signals (w, 2), for any number of rows.
-
-    hidden: model error, in units of the noise, of signals `large` times the noise.
-    """
-    own = np.max(signals**2, axis=1) / large**2
-    return max(float((left**2).sum()) - hidden**2 * (len(left) + float(own.sum())), 0.0)
 
 
 def _entropy(p: Floats) -> float:

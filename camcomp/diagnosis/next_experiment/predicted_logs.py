@@ -16,11 +16,9 @@ from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.noise import inflation
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.classes import LARGE
+from camcomp.diagnosis.model.classes import HIDDEN, LARGE
 from camcomp.diagnosis.next_experiment.candidates import Candidate
-from camcomp.diagnosis.next_experiment.information_gain import program_weight, seen_apart
 from camcomp.diagnosis.next_experiment.site import Site, site_of
-from camcomp.diagnosis.search.indistinguishable import HIDDEN
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.gcode.interpret import read_program
@@ -73,8 +71,15 @@ class Question:
 
     @cached_property
     def weight(self) -> Floats:
-        """What the columns of causes do to the tip in the runs' programs."""
-        return program_weight(self.problem)
+        """Mean over all rows (k, k) of tip' tip, mm2, for the effect of every column of a cause on the tip in the runs' programs.
+
+        Errors of the drives count with their displacement of the tip; workpiece frame and clock are no errors of the machine.
+        """
+        machine = self.problem.columns.candidate >= 0
+        for i, each in enumerate(self.problem.columns.candidates):
+            if each.effect.STAGE in ("workpiece", "sensor"):
+                machine[self.problem.columns.of(i)] = False
+        return np.asarray(self.problem.tip_gram * np.outer(machine, machine))
 
     @cached_property
     def shapes(self) -> dict[int, dict[str, float]]:
@@ -233,3 +238,12 @@ def _temperature(problem: Problem, common: Floats) -> Floats | None:
     slope = np.polyfit(t - t.mean(), warm, 1)[0] if np.ptp(t) > 0 else 0.0
     out: Floats | None = warm[int(np.argmax(t))] + np.clip(slope * (common - t.max()), -WARMS_K, WARMS_K)
     return out
+
+
+def seen_apart(signals: Floats, left: Floats, hidden: float, large: float) -> float:
+    """Chi-square of white rows `left` (w,) beyond the model error of signals (w, 2), for any number of rows.
+
+    hidden: model error, in units of the noise, of signals `large` times the noise.
+    """
+    own = np.max(signals**2, axis=1) / large**2
+    return max(float((left**2).sum()) - hidden**2 * (len(left) + float(own.sum())), 0.0)

@@ -13,7 +13,6 @@ import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.candidates import PlacedCause
-from camcomp.diagnosis.model.group import sum_grams
 from camcomp.diagnosis.model.search import search_sets
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
@@ -22,6 +21,7 @@ from camcomp.diagnosis.statistics.cause_sets import (
     scored,
 )
 from camcomp.diagnosis.statistics.evidence import estimate, freed, log_bayes
+from camcomp.diagnosis.statistics.normal_equations import sum_grams
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground import progress
 from camcomp.ground.datatypes import Floats

@@ -12,11 +12,9 @@ import numpy as np
 from scipy.linalg import eigh
 
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.classes import LARGE
-from camcomp.diagnosis.model.group import sum_grams
+from camcomp.diagnosis.model.classes import HIDDEN, LARGE
 from camcomp.diagnosis.statistics.evidence import FREE, base
-
-HIDDEN = 0.2  # difference of two effects at that size, in units of the noise, below which they are indistinguishable
+from camcomp.diagnosis.statistics.normal_equations import sum_grams
 
 
 def classes(problem: Problem) -> list[tuple[int, ...]]:

@@ -11,7 +11,6 @@ from math import comb, factorial
 
 import numpy as np
 
-from camcomp.diagnosis.model.group import NormalEquations, sum_grams
 from camcomp.diagnosis.statistics.evidence import (
     Prior,
     base,
@@ -20,6 +19,7 @@ from camcomp.diagnosis.statistics.evidence import (
     log_sum,
     misfit,
 )
+from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
 from camcomp.diagnosis.statistics.probability import EVEN, TEMPERATURE
 from camcomp.ground.datatypes import Floats
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.answer.nested import causes_without
-from camcomp.diagnosis.model.group import sum_grams
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Scale, probabilities
 from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
+from camcomp.diagnosis.statistics.normal_equations import sum_grams
 
 
 class Told(SimpleNamespace):

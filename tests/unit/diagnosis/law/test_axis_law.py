@@ -12,10 +12,10 @@ from camcomp.diagnosis.axis.terms import travel
 from camcomp.diagnosis.law.bench_terms import Term
 from camcomp.diagnosis.law.describe import law_result
 from camcomp.diagnosis.law.find import fitted
-from camcomp.diagnosis.law.folds import usual_split
 from camcomp.diagnosis.law.forms import at_drive
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.law.shapes import Shapes
+from camcomp.diagnosis.statistics.folds import usual_split
 from camcomp.model.law.covariates import AT_DRIVE
 from camcomp.model.law.expression import parse
 

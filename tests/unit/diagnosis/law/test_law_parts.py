@@ -6,11 +6,11 @@ from scipy.stats import multivariate_normal
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term
 from camcomp.diagnosis.law.find import margin, unlikely
-from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, _grams, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import Sizes, at_drive, at_tip
 from camcomp.diagnosis.law.library import LearnedLaw, keep, learned
 from camcomp.diagnosis.result.types import Law, LawPart, LawTerm
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.folds import ALTERNATING, Folds, Split, _grams, gains, usual_split, withheld
 from camcomp.model.law.covariates import AT_DRIVE, AT_TIP, is_load
 from camcomp.model.law.expression import parse
 from camcomp.model.law.spline_map import splines, tensor

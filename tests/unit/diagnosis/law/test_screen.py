@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.law.bench_terms import Spot, TermBench
-from camcomp.diagnosis.law.folds import Folds, Split
 from camcomp.diagnosis.law.forms import Form
 from camcomp.diagnosis.law.screen import Screen, TermGrid
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.folds import Folds, Split
 
 TIPS = (Spot("structure", 0), Spot("structure", 1))
 PERIODS = (30.0, 24.0, 17.0, 12.0, 9.0)
