@@ -80,12 +80,6 @@ def test_it_is_made_white_as_an_array_is(lean, values):
     assert np.array_equal(white[:, np.arange(K)], noise.rows(0, values, inflate, time, 1))
 
 
-def test_some_columns_are_put_in_places_of_a_wider_matrix(lean, whole):
-    wide = np.zeros((len(whole), 9))
-    wide[:, [7, 2]] = whole[:, [1, 5]]
-    assert np.array_equal(lean.placed(np.array([1, 5]), np.array([7, 2]), 9)[:, np.arange(9)], wide)
-
-
 def test_matrices_are_joined_one_behind_the_other(lean, values):
     more = values[:, :, ::-1]
     both = ByChannel.joined([lean, ByChannel.of(more[:, c] for c in range(CHANNELS)), lean])
