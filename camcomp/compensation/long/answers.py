@@ -250,7 +250,7 @@ def with_answers(job: Job) -> Job:
 
 def _tips(known: Field, rho: Floats, near: Floats, nominal: Floats, tile: Ints) -> Floats:
     """Tips (n, 3) whose set-points are rho (n, m), from tips `near` with set-points `nominal`: Newton's method."""
-    rates, out = np.linalg.inv(known.tiles.rates)[np.maximum(tile, 0)], near
+    rates, out = np.linalg.inv(known.tiles.rates).take(np.maximum(tile, 0), axis=0), near
     for _ in range(MOST_STEPS):
         step = np.einsum("nij,nj->ni", rates, rho - nominal)
         out = out + step

@@ -154,8 +154,8 @@ def _see_oriented(job: Job, points: JudgedPoints, told: Floats, orienting: Orien
 
 
 def _seen(points: JudgedPoints, tip: Floats, state: Correction, tilt: Floats | None = None) -> Seen:
-    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
-    return Seen(tip - points.target, state.status, tip[points.end], Correction(**at), tilt)
+    at = {each.name: getattr(state, each.name).compress(points.end, axis=0) for each in fields(state)}
+    return Seen(tip - points.target, state.status, tip.compress(points.end, axis=0), Correction(**at), tilt)
 
 
 def see_original(job: Job, points: JudgedPoints) -> Seen:
