@@ -107,6 +107,10 @@ def diagnose(
     )
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
+    proposed = None if proposal is None else NextExperiment(
+        action=proposal.candidate.action, separates=tuple(proposal.separates), gain=round(proposal.gain, 4),
+        minutes=round(proposal.candidate.minutes, 1), outcomes=proposal.outcomes,
+    )  # fmt: skip
     outliers = tuple(
         Outlier(run=run.name, row=int(row) + 1)
         for run, cells in zip(problem.bench.runs, problem.outliers, strict=True) for row in np.flatnonzero(cells.any(axis=1))
@@ -116,7 +120,7 @@ def diagnose(
         causes=_causes(stands, found, best, law),
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
         shrinkage=shrinkage if unseen else None,
-        next_experiment=_proposed(proposal) if proposal is not None else None, minor=minor_effects(stands, best),
+        next_experiment=proposed, minor=minor_effects(stands, best),
         outliers=outliers, floor=Floor(um=gap.noise_floor_um, source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(problem)),
         standards=of_runs(twin, runs),
@@ -128,13 +132,6 @@ def diagnose(
         None if result.next_experiment is None else proposal,
         None if result.law is None else law,
     )
-
-
-def _proposed(proposal: Proposal) -> NextExperiment:
-    return NextExperiment(
-        action=proposal.candidate.action, separates=tuple(proposal.separates), gain=round(proposal.gain, 4),
-        minutes=round(proposal.candidate.minutes, 1), outcomes=proposal.outcomes,
-    )  # fmt: skip
 
 
 def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal | None:

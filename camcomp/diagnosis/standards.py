@@ -18,7 +18,7 @@ from camcomp.diagnosis.statistics.standard_values import circular_deviation, pos
 from camcomp.ground.datatypes import Floats
 from camcomp.model.motion.twin import Twin
 
-TARGETS, APPROACHES = 5, 5  # ISO 230-2:2014, 5.3.2: at least
+LEAST = 5  # targets, and approaches of each from either side: ISO 230-2:2014, 5.3.2
 _STILL_MM = 1e-4  # between rows in which the axes stand
 _SAME_MM = 1e-3  # between targets that are one
 _ALONE = 1e-3  # largest share of an approach that other axes may make
@@ -120,8 +120,8 @@ def _positioning(axis: int, beside: Sequence[float], found: Sequence[_Stop]) -> 
     for stop in found:
         ways = by_target.setdefault(round(float(stop.target[axis]) / _SAME_MM), ([], []))
         ways[not stop.forward].append(stop.off)
-    whole = [ways for _, ways in sorted(by_target.items()) if min(map(len, ways)) >= APPROACHES]
-    if len(whole) < TARGETS:
+    whole = [ways for _, ways in sorted(by_target.items()) if min(map(len, ways)) >= LEAST]
+    if len(whole) < LEAST:
         return None
     values = positioning(*([np.array(ways[k]) for ways in whole] for k in (0, 1)))
     others = [name for k, name in enumerate("XYZ") if k != axis]

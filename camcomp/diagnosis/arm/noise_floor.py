@@ -49,32 +49,22 @@ def resolution(tip: Floats) -> float:
     return max(resolution_of(axis) for axis in tip.T)
 
 
-def _with_rounding(floor: TipFloor | None, campaigns: Sequence[Poses]) -> TipFloor | None:
-    """A floor with the rounding of the recorded positions, which repeats of one pose do not show."""
-    if floor is None:
-        return None
-    rounding = rounding_noise(max(resolution(each.tip) for each in campaigns))
-    return replace(floor, sd=float(np.hypot(floor.sd, rounding)))
-
-
 def tip_floor(
-    robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], stated: StatedDeviation
+    robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], stated: StatedDeviation, *, least: bool = False
 ) -> TipFloor | None:
     """The floor of campaigns with gaps (n, 3) mm to a model; None where neither a statement nor repeats determine it.
 
     It is the larger of the stated floor and the scatter of repeats about slow waves in time: repeats do not show an
-    error of the instrument's frame, and they may contradict a statement.
+    error of the instrument's frame, and they may contradict a statement. The rounding of the recorded positions, which
+    repeats do not show, is added. least: a lower bound, the stated floor, else the scatter of the quieter half of repeats.
     """
-    known = [each for each in (_stated(robot, campaigns, stated), _repeated(robot, campaigns, gaps)) if each]
-    return _with_rounding(max(known, key=lambda each: each.sd, default=None), campaigns)
-
-
-def least_floor(
-    robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], stated: StatedDeviation
-) -> TipFloor | None:
-    """Lower bound of the floor: the stated one, else the scatter of the quieter half of repeats."""
-    found = _stated(robot, campaigns, stated) or _repeated(robot, campaigns, gaps, quiet=True)
-    return _with_rounding(found, campaigns)
+    both = _stated(robot, campaigns, stated), _repeated(robot, campaigns, gaps, quiet=least)
+    known = [each for each in both if each]
+    if not known:
+        return None
+    found = known[0] if least else max(known, key=lambda each: each.sd)
+    rounding = rounding_noise(max(resolution(each.tip) for each in campaigns))
+    return replace(found, sd=float(np.hypot(found.sd, rounding)))
 
 
 def far_off(size: Floats, time: Floats) -> np.ndarray:
@@ -109,7 +99,7 @@ def _stated(robot: Robot, campaigns: Sequence[Poses], stated: StatedDeviation) -
     return TipFloor(float(np.sqrt(whole.mean())), np.inf, "stated") if np.isfinite(whole).all() else None
 
 
-def _repeated(robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], quiet: bool = False) -> TipFloor | None:
+def _repeated(robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], quiet: bool) -> TipFloor | None:
     """From poses visited again, else from tips read again while the arm stood. quiet: from their median."""
     anew: list[tuple[float, float]] = []
     still: list[tuple[float, float]] = []

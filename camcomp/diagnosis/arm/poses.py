@@ -286,22 +286,16 @@ class ArmBench:
         for j in sorted(set(range(len(columns))) - set(waves)):
             module = columns[j].module
             if signal_path.stages_of(module) == {"drive"} and not signal_path.pushes(module) and j not in amounts:
-                X[:, :, j] = self._drive_motion(campaign, joints, columns[j])
+                cause = columns[j].cause(1.0)
+                cause = replace(cause, values=complete(cause))
+                error, _ = signal_path.driven([cause], self.actuators, _standing(self.robot, campaign))
+                X[:, :, j] = np.einsum("nim,nm->ni", joints, error)
                 continue
             moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + SHARE_OF_SCALE})
             if columns[j].shape and j not in amounts:  # another shape of the same place may act
                 moved = [*causes, *combined(columns, {j: SHARE_OF_SCALE})]
             X[:, :, j] = (self.standing(campaign, moved).tips(frame) - here) / SHARE_OF_SCALE
         return X
-
-    def _drive_motion(self, campaign: Poses, joints: Floats, column: Column) -> Floats:
-        """Tip motion (n, 3) by the drive errors of a column; joints (n, 3, m): tip motion per rad (mm) of every
-        joint.
-        """
-        cause = column.cause(1.0)
-        cause = replace(cause, values=complete(cause))
-        error, _ = signal_path.driven([cause], self.actuators, _standing(self.robot, campaign))
-        return np.asarray(np.einsum("nim,nm->ni", joints, error), float)
 
     def joint_motion(self, poses: Poses, causes: Sequence[Cause], at: Registration) -> Floats:
         """Motion (n, 3, m) of tips, machine frame, mm per rad (mm) by which a joint stands off its encoder."""

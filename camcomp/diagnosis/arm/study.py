@@ -17,7 +17,7 @@ from camcomp.diagnosis.arm import answer
 from camcomp.diagnosis.arm.case import PoseCase, named_rows
 from camcomp.diagnosis.arm.linear import Shelf, linearise
 from camcomp.diagnosis.arm.next_poses import next_poses
-from camcomp.diagnosis.arm.noise_floor import TipFloor, far_off, least_floor, resolution, tip_floor
+from camcomp.diagnosis.arm.noise_floor import TipFloor, far_off, resolution, tip_floor
 from camcomp.diagnosis.arm.pose_values import of_poses
 from camcomp.diagnosis.arm.poses import LEAST_POSES, ArmBench, Poses, combined
 from camcomp.diagnosis.arm.temporary_offsets import EFFECT as SPELL
@@ -58,7 +58,7 @@ def solve(
     every = [drawn(each) for each in (*own, *held)]
     bench, shelf, outliers, weights = cleaned(robot, tuple(causes), every, len(own), without)
     gaps = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
-    least = least_floor(robot, bench.campaigns, gaps, stated)
+    least = tip_floor(robot, bench.campaigns, gaps, stated, least=True)
     sd = least.sd if least else noise_of_richest(bench, shelf, weights)
     with progress.part(0.1, 0.5):
         shelf, found = explained(bench=bench, shelf=shelf, sd=sd, floor=least, weights=weights, without=without)

@@ -19,7 +19,7 @@ from camcomp.diagnosis.arm.poses import CURVE, LEAST_POSES, ArmBench
 from camcomp.diagnosis.model.evidence import Background, LinearModel
 from camcomp.diagnosis.model.folds import REGIONS, Excess, excess_of, folds_of, held_out
 from camcomp.diagnosis.model.group import Group, split_regions
-from camcomp.diagnosis.model.search import MOST, best_of, search_sets
+from camcomp.diagnosis.model.search import best_of, search_sets
 from camcomp.diagnosis.result.types import FoundCause, UnknownCause, UnseenShrinkage
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats, Ints
@@ -138,7 +138,7 @@ def left_out_in_turn(
     refitted = False
     for g, others in folds_of(model):
         less = replace(model, fitted=others)
-        members = best_of(search_sets(less.reduced(background), MOST))
+        members = best_of(search_sets(less.reduced(background)))
         at = less.posterior(background, less.reduced(background).slab(members))
         own = {model.candidates[i].place: list(model.candidates[i].columns) for i in members}
         own |= {(name, None): less.family(name)[0].tolist() for name, _ in background.families}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -20,21 +20,12 @@ def lever_mm(revolute: bool) -> float:
 
 def whole_errors(found: Sequence[AxisFindings]) -> dict[str, Errors]:
     """Errors by run and axis: set-point minus encoder, and encoder minus second encoder, each about its mean over the runs."""
-    out: dict[str, dict[str, tuple[Floats, Floats]]] = {}
-    for a, channel, sign in _channels(found):
-        middle = float(np.mean(channel.rows))
-        for r in channel.fitted:
-            _add(out.setdefault(r.name, {}), a.name, r.whole[0], sign * (r.whole[1] - middle))
-    return dict(out)
+    return _by_run(found, lambda c: [(r.name, r.whole[0], r.whole[1] - float(np.mean(c.rows))) for r in c.fitted])
 
 
 def held_errors(found: Sequence[AxisFindings], *, explained: bool) -> dict[str, Errors]:
     """Errors of withheld runs by run and axis, minus their constant or minus the fitted model."""
-    out: dict[str, dict[str, tuple[Floats, Floats]]] = {}
-    for a, channel, sign in _channels(found):
-        for r in channel.held:
-            _add(out.setdefault(r.name, {}), a.name, r.move.time, sign * (r.left if explained else r.gap))
-    return dict(out)
+    return _by_run(found, lambda c: [(r.name, r.move.time, r.left if explained else r.gap) for r in c.held])
 
 
 def position_floor(axis: AxisFindings) -> float:
@@ -48,10 +39,14 @@ def _channels(found: Sequence[AxisFindings]) -> list[tuple[AxisFindings, AxisCha
     return [(a, c, sign) for a, c, sign in both if c is not None]
 
 
-def _add(errors: dict[str, tuple[Floats, Floats]], name: str, time: Floats, values: Floats) -> None:
-    """Add errors (n,) of a channel to those of an axis, at the times of its first channel."""
-    if name in errors:
-        at, own = errors[name]
-        errors[name] = at, own + np.interp(at, time, values)
-    else:
-        errors[name] = time, values
+def _by_run(
+    found: Sequence[AxisFindings], of: Callable[[AxisChannel], list[tuple[str, Floats, Floats]]]
+) -> dict[str, Errors]:
+    """Errors by run and axis, at the times of its first channel; of: runs, times (n,) and values (n,) of a channel."""
+    out: dict[str, dict[str, tuple[Floats, Floats]]] = {}
+    for a, channel, sign in _channels(found):
+        for run, time, values in of(channel):
+            errors = out.setdefault(run, {})
+            at, own = errors.get(a.name, (time, np.zeros(len(time))))
+            errors[a.name] = at, own + np.interp(at, time, sign * values)
+    return dict(out)

@@ -50,7 +50,7 @@ def next_moves(
         if designed is not None:
             moves, bits = designed
             return NextExperiment(
-                action=_action(moves), separates=(UNKNOWN,), gain=round(bits, 4), minutes=round(_minutes(moves), 1),
+                action=_action(moves), separates=(UNKNOWN,), gain=round(bits, 4), minutes=round(SETUP_MIN + float(set_points(moves)[0][-1]) / 60.0, 1),
                 outcomes=_outcomes(axis, verdict), moves=moves,
             )  # fmt: skip
     return None
@@ -63,7 +63,7 @@ def set_points(moves: AxisMoves) -> tuple[Floats, Floats]:
         for target in (block.low, *(block.high, block.low) * block.times):
             parts += [
                 _way(at, target, block.speed, moves.acceleration, moves.step_s),
-                np.full(_rows(REST_S, moves), target),
+                np.full(max(round(REST_S / moves.step_s), 1), target),
             ]
             at = target
     place: Floats = np.concatenate(parts)
@@ -138,14 +138,6 @@ def _way(start: float, end: float, speed: float, acceleration: float, step: floa
     steady = np.clip(t - ramp, 0.0, whole - 2.0 * ramp)
     way = 0.5 * acceleration * (up**2 + ramp**2 - down**2) + speed * steady
     return np.asarray(start + np.sign(end - start) * way)
-
-
-def _rows(seconds: float, moves: AxisMoves) -> int:
-    return max(round(seconds / moves.step_s), 1)
-
-
-def _minutes(moves: AxisMoves) -> float:
-    return SETUP_MIN + float(set_points(moves)[0][-1]) / 60.0
 
 
 def _tidy(value: float) -> float:

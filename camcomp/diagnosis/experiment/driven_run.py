@@ -15,7 +15,6 @@ from camcomp.diagnosis.experiment.log_checks import (
     check_lines,
     check_on_program,
     check_places,
-    check_set_points,
     places,
 )
 from camcomp.diagnosis.experiment.logged import Logged
@@ -89,7 +88,7 @@ def drive(log: Logged, text: Program | None, conditions: Conditions) -> DrivenRu
         return _led_by_tip(log, program)
     rho, guessed = _commanded(log, by)
     if program is not None:
-        check_set_points(log, what=by, told=rho, program=program.rho)
+        check_on_program(log, by, rho, program.rho)
     tip, turned = _forward(twin, rho, *_near(log, rho, program))
     aligned = None if program is None else _aligned(log, program, tip)
     check = partial(check_places, log, rho=rho, tip=tip)
@@ -313,7 +312,7 @@ def _led_by_tip(log: Logged, program: _Program) -> DrivenRun:
     """Run of a measured tip aligned with the program: its timing is free, and only its lateral deviation is evidence."""
     path, twin, measured = program.track.path, log.twin, log.measured
     known = np.asarray(np.isfinite(measured.tip).all(axis=1))
-    check_on_program(log, measured.tip[known], program.tips)
+    check_on_program(log, "tip", measured.tip[known], program.tips)
     whole = log.over_time(measured.tip, known)
     bend, changed = np.zeros_like(whole), np.inf
     # a deflected tip is off its program by an unknown amount at first, and its position on arcs depends on the deflection

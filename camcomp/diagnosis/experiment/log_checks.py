@@ -176,25 +176,21 @@ def check_places(log: Logged, *, rho: Floats, tip: Floats, loaded: Callable[[], 
             _check(log, what, found[rows], partial(_distance, due=due[rows]))
 
 
-def check_set_points(log: Logged, *, what: str, told: Floats, program: Floats) -> None:
-    """Like `check_places` for the motion itself: set-points told (n, m) against actuators program (s, m) of the program."""
-    _check(log, f"{what}s look", told, _to_nearest(program, FAR_RAD if log.revolute.all() else FAR_MM))
+def check_on_program(log: Logged, what: str, found: Floats, program: Floats) -> None:
+    """Like `check_places` for the motion itself, `tip` or a channel of actuators: found (n, k) against points program (s, k)."""
+    tree = KDTree(program)
+    far = FAR_RAD if what != "tip" and log.revolute.all() else FAR_MM
 
+    def nearest(points: Floats) -> float:
+        return float(np.median(tree.query(points[places(points, far)])[0]))
 
-def check_on_program(log: Logged, tip: Floats, program: Floats) -> None:
-    """Like `check_places` if the tip is the motion: tip (n, 3) against points program (s, 3) of the program."""
-    _check(log, "tip looks", tip, _to_nearest(program, FAR_MM))
+    _check(log, "tip looks" if what == "tip" else f"{what}s look", found, nearest)
 
 
 def places(points: Floats, far: float = FAR_MM) -> Ints:
     """One row per distinct position of points (n, k), so that standstills do not count by their duration."""
     rows: Ints = np.unique(np.round(points / (PLACE * far)), axis=0, return_index=True)[1]
     return rows
-
-
-def _to_nearest(program: Floats, far: float) -> Callable[[Floats], float]:
-    tree = KDTree(program)
-    return lambda found: float(np.median(tree.query(found[places(found, far)])[0]))
 
 
 def _check(log: Logged, what: str, found: Floats, distance: Callable[[Floats], float]) -> None:

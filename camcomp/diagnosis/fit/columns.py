@@ -28,8 +28,7 @@ from camcomp.model.effect import Cause, Load, Parameter, applies
 from camcomp.model.statics.description import Link, Parallelogram, Robot
 
 RUN_OFFSET_N = 0.3
-CLOCK_JITTER_S = 1e-5
-CLOCK_RATE = 1e-5
+CLOCK_JITTER_S = 1e-5  # of a clock, and of its second
 SPRING_LOG = 0.01  # one link's spring against its stated value
 MOST_HEALTHY = 0.3  # of an effect's typical size
 # tolerances beyond which it is no tolerance: at the tip no longer minor, by chance once in 5600
@@ -243,7 +242,7 @@ def _nuisances(bench: Bench) -> list[Nuisance]:
             second = ticks[r] / scale
             time = thinned(run.run_path.time[:, None], run.thin)
             found.append((f"clock.{run.name}", CLOCK_JITTER_S, only(r, second)))
-            found.append((f"rate.{run.name}", CLOCK_RATE, only(r, second * time)))
+            found.append((f"rate.{run.name}", CLOCK_JITTER_S, only(r, second * time)))
         _by_label(found, bench, "clock", [(clock.parameters[0].name, ticks)])
         frames = candidate_columns(bench, frame, {})
         _by_label(found, bench, "clamping", [(p.name, f) for p, f in zip(frame.parameters, frames, strict=True)])

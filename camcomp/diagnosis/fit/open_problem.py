@@ -23,7 +23,6 @@ from camcomp.diagnosis.fit.noise import inflation, instrument_noise
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.evidence import ABSENT
 from camcomp.diagnosis.model.noise import HEALTHY, MINOR
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior
@@ -135,9 +134,9 @@ def _scanned(problem: Problem) -> Problem:
     scanned = [i for i in problem.shapes if problem.columns.candidates[i].shapes]
     own = [c for i in scanned for c in problem.candidates.columns[i]]
     precision = np.where(problem.columns.candidate >= 0, 1.0 / 9.0, problem.prior.precision)  # three scales
-    precision[own] = ABSENT
+    white = [W.exchanged(own, np.zeros((len(W), len(own)))) for W in problem.white]
     base = Folds(
-        white=problem.white, residual=problem.white_residual, precision=precision, constants=[], split=Split(1, 1),
+        white=white, residual=problem.white_residual, precision=precision, constants=[], split=Split(1, 1),
         places=[problem.row_places(k) for k in range(len(problem.white))],
     )  # fmt: skip
     rest = base.left()

@@ -12,6 +12,7 @@ from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
 from camcomp.diagnosis.fit.patterns import KINDS, Dictionary
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
+from camcomp.diagnosis.model.discrepancy import ROWS_OF_PROCESS
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale
@@ -28,7 +29,6 @@ from camcomp.model.signal_path import pushes, stages_of
 SETTLED = 0.05  # chi-square that one more pass may cost
 FARTHER = 10  # further passes for shapes that are on their way from where they were scanned
 HALVED = 6  # times that a step is halved which no machine can take
-ROWS_AT_ONCE = 256  # in a sum over rows: all of a long run at once are much memory
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 
 
@@ -58,8 +58,8 @@ class Problem:
         """Products (k, k) of the columns' tip motion, mean over the rows of all runs, mm2."""
         out = np.zeros((len(self.columns.names),) * 2)
         for k, (block, own) in enumerate(zip(self.columns.blocks, self.residuals, strict=True)):
-            for first in range(0, len(own), ROWS_AT_ONCE):
-                rows = slice(first, first + ROWS_AT_ONCE)
+            for first in range(0, len(own), ROWS_OF_PROCESS):
+                rows = slice(first, first + ROWS_OF_PROCESS)
                 moved = moved_tip(self.bench, k, block.dense(rows), rows).reshape(-1, len(out))
                 out += moved.T @ moved
         return out / max(sum(map(len, self.residuals)), 1)

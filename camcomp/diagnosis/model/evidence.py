@@ -33,7 +33,6 @@ from camcomp.ground.datatypes import Floats, Ints
 WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: effect of a cause on the channels
 LONG = 20  # columns: a longer candidate has no small errors
 FREE = 1e-6  # precision of nuisances in units of their columns
-ABSENT = 1e30  # precision of a column that takes no part
 LEAST_VISIBLE = 1e-6  # of a column's size: what nuisances leave of it; below, the column is not seen
 Members = tuple[int, ...]
 
@@ -151,7 +150,7 @@ class LinearModel:
 
     def precision(self, background: Background, slab: Mapping[int, float] | None = None) -> Floats:
         """Prior precision (q,) of all columns; slab: width of the columns of causes."""
-        out = np.full(self.layout.size, ABSENT)
+        out = np.full(self.layout.size, np.inf)  # of a column that takes no part
         for own in self.layout.nuisances.values():
             out[own] = FREE
         for name, scale in (*self.healthy.items(), *background.scales):
@@ -186,7 +185,7 @@ class LinearModel:
             self.total(background.process, groups),
             self.precision(background, slab),
         )
-        live = precision < ABSENT
+        live = np.isfinite(precision)
         live[:k] &= self.size > 0.0
         live[list(absent)] = False
         return AmplitudePosterior.of(data, precision, np.flatnonzero(live), background.noise)
@@ -196,7 +195,7 @@ class LinearModel:
         if background.process is None or background.process in self._grams:
             return self.posterior(background, slab).log_evidence
         precision = self.precision(background, slab)
-        live = precision < ABSENT
+        live = np.isfinite(precision)
         live[: self.layout.effects] &= self.size > 0.0
         on = np.flatnonzero(live)
         data = [normal_equations(self.groups[g], self.layout, background.process, on) for g in self.own]

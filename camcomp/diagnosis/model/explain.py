@@ -27,7 +27,7 @@ from camcomp.diagnosis.model.discrepancy import (
     residuals,
 )
 from camcomp.diagnosis.model.evidence import Background, LinearModel, Members, Reduced
-from camcomp.diagnosis.model.search import MOST, ROUNDS, best_of, search_sets
+from camcomp.diagnosis.model.search import ROUNDS, best_of, search_sets
 from camcomp.ground.datatypes import Floats
 
 STATED = 0.08  # log deviation of a stated noise: instruments know themselves to an eighth in the square
@@ -113,14 +113,12 @@ class Explanation:
         return sorted({*own, *self.data.indices(self.members)})
 
 
-def explain(
-    model: LinearModel, noise: KnownNoise | None, start: Background | None = None, most: int = MOST
-) -> Explanation:
+def explain(model: LinearModel, noise: KnownNoise | None, start: Background | None = None) -> Explanation:
     """Sets of causes and the model discrepancy, from all fitted groups; start: a background to begin with."""
     weighed: dict[Background, dict[Members, float]] = {}
 
     def search_beside(background: Background) -> dict[Members, float]:
-        found = search_sets(model.reduced(background), most)
+        found = search_sets(model.reduced(background))
         prior = log_prior(model, background, noise)
         weighed[background] = {m: v + prior for m, v in found.items()}
         return found

@@ -142,9 +142,11 @@ def _lay(question: Question, candidate: Candidate, whole: bool) -> PredictedLogs
         size[np.ix_(mine, mine)] = _root(covariance[np.ix_(theirs, theirs)])
         signals.append(change + block[:, :, mine] @ mean[theirs])
         reach.append(size)
+    sigma = _noise(problem)
+    size_of = {kind: float(np.sqrt(np.mean(sigma[problem.channels_of(kind)] ** 2))) for kind in KINDS}
     return PredictedLogs(
         signals=_whitened(problem, bench, np.stack(signals, axis=2)), columns=_whitened(problem, bench, block),
-        reach=reach, mine=mine, theirs=theirs, size=_sizes(problem),
+        reach=reach, mine=mine, theirs=theirs, size=size_of,
     )  # fmt: skip
 
 
@@ -161,11 +163,6 @@ def _noise(problem: Problem) -> Floats:
     known = np.isfinite(problem.noise.sigma)
     sigma = np.where(known, problem.noise.sigma, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     return np.where(known.any(axis=0), sigma, np.repeat(np.array(USUAL_NOISE), [3, m, m, 3]))
-
-
-def _sizes(problem: Problem) -> dict[str, float]:
-    sigma = _noise(problem)
-    return {kind: float(np.sqrt(np.mean(sigma[problem.channels_of(kind)] ** 2))) for kind in KINDS}
 
 
 def _whitened(problem: Problem, bench: Bench, values: Floats) -> dict[str, Floats]:

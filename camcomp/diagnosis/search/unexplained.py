@@ -47,7 +47,9 @@ def unexplained(problem: Problem, f: Fitted) -> dict[str, Unexplained]:
     left = [_left(problem, f, k) for k in range(len(problem.bench.runs))]
     out = {}
     for kind in KINDS:
-        at_tip = [_at_tip(problem, k, r, kind) for k, r in enumerate(left)]
+        on = problem.channels_of(kind)
+        ways = [thinned(problem.bench.at_tip(k)[:, :, on], run.thin) for k, run in enumerate(problem.bench.runs)]
+        at_tip = [np.einsum("nij,nj->ni", way, r[:, on]) for way, r in zip(ways, left, strict=True)]
         if any(np.isfinite(a).any() for a in at_tip):
             out[kind] = unexplained_of(problem, kind, at_tip)
     return out
@@ -82,13 +84,6 @@ def undetermined(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
     faint, ends = ndtri(SURELY) * doubt > np.abs(theta), np.cumsum(widths)
     each = [bool(faint[end - width : end].all()) for end, width in zip(ends, widths, strict=True)]
     return np.repeat(each, widths).astype(bool)
-
-
-def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
-    """Residuals (n, 3) of one kind of channel, mm at the tip, of run k."""
-    channels = problem.channels_of(kind)
-    ways = problem.bench.at_tip(k)[:, :, channels]
-    return np.asarray(np.einsum("nij,nj->ni", thinned(ways, problem.bench.runs[k].thin), left[:, channels]))
 
 
 def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:
