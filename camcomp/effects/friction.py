@@ -45,7 +45,7 @@ _MORE = (
         "stribeck_mm_per_s",
         "mm/s",
         1.0,
-        1e-3,
+        0.1,
         1e3,
         0.5,
         0.0,

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import yaml
+from scipy.signal import lfilter
 
 from camcomp.api.diagnosis import diagnose
 from tests.commandline import ROOT
@@ -261,3 +262,36 @@ def test_a_joint_hung_otherwise_than_its_file_says_shows_its_stribeck_friction(t
     ):
         low, high = friction.parameters[name].ci95
         assert low <= true <= high and high - low < 0.3 * true
+
+
+def milling_log(folder, name, seed):
+    """Moves of a slide with stops between them, every 10 ms; its friction goes with the speed, and so is gone at rest."""
+    rng, step, rows = np.random.default_rng(seed), 1e-3, 40_000
+    parts, place = [], 0.0
+    while sum(map(len, parts)) < rows:
+        way, fast = rng.uniform(-80.0, 80.0) - place, rng.choice([10.0, 30.0, 60.0])
+        rise = min(fast / 800.0, np.sqrt(abs(way) / 800.0))
+        speed = np.interp(np.arange(0.0, abs(way) / (800.0 * rise) + rise, step), *zip(
+            (0.0, 0.0), (rise, 1.0), (abs(way) / (800.0 * rise), 1.0), (abs(way) / (800.0 * rise) + rise, 0.0), strict=True
+        ))  # fmt: skip
+        parts += [place + way * np.cumsum(speed) / speed.sum(), np.full(int(rng.uniform(100, 800)), place + way)]
+        place += way
+    asked_for = np.concatenate(parts)[:rows]
+    encoder = lfilter([1.0 / 20.0], [1.0, 1.0 / 20.0 - 1.0], asked_for)  # 19 ms
+    speed = np.gradient(encoder, step)
+    force = 0.06 * np.gradient(speed, step) + 150.0 * np.tanh(speed / 0.5) + 1.2 * speed
+    columns = {
+        "t_s": step * np.arange(rows), "cmd_x_mm": asked_for, "act_x_mm": encoder + rng.normal(0.0, 1e-3, rows),
+        "act_x_N": force + rng.normal(0.0, 8.0, rows),
+    }  # fmt: skip
+    write(folder, name, {key: each[::10] for key, each in columns.items()})
+
+
+def test_friction_that_is_gone_at_rest_is_no_stribeck_friction(tmp_path):
+    for name, seed in (("a", 1), ("b", 5)):
+        milling_log(tmp_path, name, seed)
+    result = asked(tmp_path, [str(ROOT / "config" / "cartesian.yaml")], "ab", holdout=["b"])
+    (friction,) = [c for c in result.causes if c.effect == "friction"]
+    sizes = {name: each.value for name, each in friction.parameters.items()}
+    assert sizes["force_N"] == pytest.approx(150.0, rel=0.03) and sizes.get("stribeck_N", 0.0) < 15.0
+    assert sizes["viscous_Ns_per_mm"] == pytest.approx(1.2, rel=0.1)

@@ -25,7 +25,7 @@ from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun, 
 from camcomp.diagnosis.axis.gate import WITHIN, AxisGate, judge, not_known
 from camcomp.diagnosis.axis.row_noise import log_gain
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
-from camcomp.diagnosis.axis.terms import AxisTravel, ripple
+from camcomp.diagnosis.axis.terms import TURNS_MM_PER_S, AxisTravel, ripple
 from camcomp.diagnosis.law.words import law_sum
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.result.types import LawPart
@@ -34,7 +34,6 @@ from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import PRESLIDING_MM
 
 TURNS_MM = (1e-4, 0.003, 0.02, 0.1)  # ways over which the friction of a slide turns round in its following error
-TURNS_MM_PER_S = (0.3, 1.5, 5.0)  # speeds with which it may turn round instead
 CORNERS_MM_PER_S = (0.3, 1.5, 5.0, 15.0)  # of a polygon over the speed by which the friction of a hinge turns round
 CREEP = 0.02  # of the fastest row: speed at which Coulomb friction has turned round
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from camcomp.diagnosis.axis.findings import ROWS, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.terms import (
+    TURNS_MM_PER_S,
     WIDE,
     AxisTravel,
     solve,
@@ -99,8 +100,9 @@ def _beside(bodies: list[Floats] | None, runs: list[AxisRun], which: list[int]) 
 
 
 def _usual(m: AxisTravel) -> Floats:
-    """Terms of every axis (n, 4): a constant, inertia, speed, and the sign of speed."""
-    return np.stack([np.ones_like(m.time), 1e-3 * m.acceleration, m.speed, np.sign(m.speed)], axis=1)
+    """Terms of every axis (n, q): a constant, inertia, speed, its sign, and friction that turns round with it."""
+    turned = np.tanh(m.speed[:, None] / TURNS_MM_PER_S)
+    return np.column_stack([np.ones_like(m.time), 1e-3 * m.acceleration, m.speed, np.sign(m.speed), turned])
 
 
 def _misfit(runs: list[AxisRun], values: list[Floats], moves: list[AxisTravel], bodies: list[Floats]) -> float:
