@@ -160,11 +160,18 @@ def _columns(data: ChannelData, terms: Sequence[AxisCause], k: int, at: Sequence
 def _shaped(
     data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats], sd: float
 ) -> tuple[list[AxisCause], list[Floats]]:
-    """Terms and amplitudes with the shapes of the causes that act by one Gauss-Newton step; as they are where it does not help."""
-    terms, at, names = [*terms], [*at], _scanned(terms, members)
+    """Terms and amplitudes with the shapes of the causes that act by one Gauss-Newton step, and the better setting of their
+    switches, which causes that are not there yet do not show; as they are where it does not help.
+    """
+    terms, at, base = [*terms], [*at], _misfit(data, terms, members, at, sd)
+    for i in members:
+        for other in terms[i].other_settings:
+            by = [*terms[:i], other, *terms[i + 1 :]]
+            if (left := _misfit(data, by, members, at, sd)) < base:
+                terms, base = by, left
+    names = _scanned(terms, members)
     if not names:
         return terms, at
-    base = _misfit(data, terms, members, at, sd)
     change, _ = _jointly(data, terms, members, at, sd)
     for share in (1.0, 0.3, 0.1):
         moved, by, place = [*at], [*terms], 0

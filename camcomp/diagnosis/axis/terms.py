@@ -13,7 +13,7 @@ from camcomp.model.hysteresis import direction, first_order
 from camcomp.model.seams import Seams
 
 STANDS_OUT = 1.6  # times the next line of a spectrum
-TURNS_MM_PER_S = (0.3, 1.5, 5.0)  # speeds with which friction may turn round
+TURNS_MM_PER_S = (0.3, 0.6, 1.5, 3.0, 6.0)  # speeds with which friction may turn round
 WIDE = (5, 10, 20, 40)  # samples on either side of a local cubic
 
 
