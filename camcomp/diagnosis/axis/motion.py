@@ -100,18 +100,21 @@ def _beside(bodies: list[Floats] | None, runs: list[AxisRun], which: list[int]) 
 
 
 def _usual(m: AxisTravel) -> Floats:
-    """Terms of every axis (n, q): a constant, inertia, speed, its sign, and friction that turns round with it."""
-    turned = np.tanh(m.speed[:, None] / TURNS_MM_PER_S)
-    return np.column_stack([np.ones_like(m.time), 1e-3 * m.acceleration, m.speed, np.sign(m.speed), turned])
+    """Terms of every axis (n, 4): a constant, inertia, speed, and the sign of speed."""
+    return np.stack([np.ones_like(m.time), 1e-3 * m.acceleration, m.speed, np.sign(m.speed)], axis=1)
 
 
 def _misfit(runs: list[AxisRun], values: list[Floats], moves: list[AxisTravel], bodies: list[Floats]) -> float:
-    """Mean absolute residual of a channel's changes after a fit of the changes of the usual terms, and of columns (n, b).
+    """Mean absolute residual of a channel's changes after a fit of the changes of the usual terms, of friction that turns round
+    with the speed, and of columns (n, b).
 
     Changes and absolute values keep a disturbance force from outweighing the corners of a motion.
     """
     changes = [
-        _changes(r.time[r.clear], np.column_stack([_usual(m)[:, 1:], b, y])[r.clear])
+        _changes(
+            r.time[r.clear],
+            np.column_stack([_usual(m)[:, 1:], np.tanh(m.speed[:, None] / TURNS_MM_PER_S), b, y])[r.clear],
+        )
         for r, m, y, b in zip(runs, moves, values, bodies, strict=True)
     ]
     rows = np.concatenate(changes)
