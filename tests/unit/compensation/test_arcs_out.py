@@ -41,7 +41,7 @@ def test_an_arc_is_found_from_three_of_its_points(axis, turn):
     again = arcs_out.along(start, end, arcs.take(np.zeros(9, int)), np.repeat(axes, 9, axis=0), np.linspace(0, 1, 9))
     np.testing.assert_allclose(again, points, atol=1e-12)
     length = np.hypot(3.0 * turn, 0.2 * turn)
-    assert arcs_out.lengths(three[0], three[2], arcs, axes)[0] == pytest.approx(length)
+    assert arcs_out.lengths(three[0], three[2], arcs, axes, np.zeros(1, int))[0] == pytest.approx(length)
     assert arcs_out.through(*three, axes, np.array([-turn]), 1e-4)[1].all()  # the middle lies on the other way round
 
 
@@ -50,7 +50,7 @@ def test_what_hardly_bends_is_a_line():
     start, end = np.zeros((1, 3)), np.array([[10.0, 0, 1]])
     flat, wrong = arcs_out.through(start, np.array([[5.0, 1e-5, 0.5]]), end, z, np.array([-1.0]), 2e-4)
     assert not flat.on.any() and not wrong.any()
-    assert arcs_out.lengths(start, end, flat, z)[0] == pytest.approx(np.sqrt(101.0))
+    assert arcs_out.lengths(start, end, flat, z, np.zeros(1, int))[0] == pytest.approx(np.sqrt(101.0))
     assert arcs_out.along(start, end, flat, z, np.array([0.5])) == pytest.approx(np.array([[5.0, 0, 0.5]]))
     assert Arcs.none(2).take(np.array([1])).on.tolist() == [False]
 
