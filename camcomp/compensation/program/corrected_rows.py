@@ -156,6 +156,7 @@ def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None, apart:
     kept = np.flatnonzero(arc & ~bent)
     centre[kept] = path.centre[rows.motion[kept]]
     return Output(
-        motion=rows.motion, kind=rows.kind.astype(np.int8), end=rows.end, centre=centre, angle=rows.sweeps(path), feed=rows.feed, joining=rows.joining,
+        motion=rows.motion, kind=rows.kind.astype(np.int8), end=rows.end, centre=centre,
+        angle=rows.sweeps(path), feed=rows.feed, joining=rows.joining,
         rest=rest, apart=apart, words=rows.words,
     )  # fmt: skip

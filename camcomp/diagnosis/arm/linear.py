@@ -138,7 +138,7 @@ def dictionary(bench: ArmBench, sd: float) -> dict[str, list[Floats]]:
         ):
             if np.ptp(np.concatenate(values)) > 0.0:
                 turned = kind == "position" and not drive.revolute
-                out[f"{kind}:{drive.name}"] = _of(values, _and_turns(bench, a, hung, axes) if turned else axes)
+                out[f"{kind}:{drive.name}"] = _of(values, _error_motions(bench, a, hung, axes) if turned else axes)
                 for i, joint in enumerate(bench.actuators):
                     out[f"{kind}:{drive.name}{BY}{joint}"] = _of(values, [w[:, :, i : i + 1] for w in ways])
     for i, axis in enumerate("xyz"):
@@ -158,7 +158,7 @@ def _of(values: Sequence[Floats], directions: Sequence[Floats]) -> list[Floats]:
     ]  # fmt: skip
 
 
-def _and_turns(bench: ArmBench, a: int, hung: Sequence[Hung], axes: Sequence[Floats]) -> list[Floats]:
+def _error_motions(bench: ArmBench, a: int, hung: Sequence[Hung], axes: Sequence[Floats]) -> list[Floats]:
     """Directions (n, 3, 6) of every campaign: shifts along the axes, and turns about a point of joint a that move the tip as far."""
     levers = [
         each.point - np.array([joint_lines(bench.arm, q)[1][a] for q in campaign.q])

@@ -50,7 +50,8 @@ def next_moves(
         if designed is not None:
             moves, bits = designed
             return NextExperiment(
-                action=_action(moves), separates=(UNKNOWN,), gain=round(bits, 4), minutes=round(SETUP_MIN + float(set_points(moves)[0][-1]) / 60.0, 1),
+                action=_action(moves), separates=(UNKNOWN,), gain=round(bits, 4),
+                minutes=round(SETUP_MIN + float(set_points(moves)[0][-1]) / 60.0, 1),
                 outcomes=_outcomes(axis, verdict), moves=moves,
             )  # fmt: skip
     return None
