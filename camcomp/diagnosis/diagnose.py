@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.diagnosis.answer.held_out import shrinkage_of
-from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, run_gaps
+from camcomp.diagnosis.answer.locate import channel_axes, run_gaps
 from camcomp.diagnosis.answer.minor import MOST_LISTED, minor_effects
 from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.answer.stretch import with_stretches
@@ -292,7 +292,10 @@ def _where(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer | 
         "lines": places.lines(gaps),
         "intervals": places.intervals(left),
         "drivers": with_stretches(_drivers(problem, found, heard), problem, best),
-        **patterns_of(problem, gaps, heard),
+        "frequencies": [
+            {"axis": f.name, "hertz": round(f.hertz, 4), "amplitude_um": round(1e3 * f.amplitude, 3), "share": round(f.share, 4)}
+            for f in heard
+        ],
     })  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""How far the gap shrinks: between the noise floor and the ceiling, step by step, and with what was re-fitted named."""
+"""How far the gap shrinks: step by step to near the noise floor, and with what was re-fitted named."""
 
 import shutil
 from dataclasses import replace
@@ -14,15 +14,14 @@ from tests.validation.plants.further_run import add_run
 
 
 @pytest.mark.parametrize("plan", [SCREW, pytest.param(PAIR, marks=pytest.mark.campaign)])
-def test_steps_lead_from_the_gap_to_near_the_floor_and_the_ceiling_is_no_worse(workshop, plan):
+def test_steps_lead_from_the_gap_to_near_the_floor(workshop, plan):
     result = workshop.answer(plan)[0]
     found = result["shrinkage"]
     sizes = [found["before_rms_um"], *(step["after_rms_um"] for step in found["steps"])]
     assert len(found["steps"]) == len([c for c in result["causes"] if c["effect"] != "unknown"])
     assert sizes == sorted(sizes, reverse=True) and sizes[-1] == found["after_rms_um"]
     assert found["noise_floor_um"] == result["gap"]["noise_floor_um"]
-    assert found["ceiling_ratio"] >= found["ratio"] - 0.002
-    assert found["ceiling_rms_um"] < 1.6 * found["noise_floor_um"]
+    assert found["after_rms_um"] < 1.8 * found["noise_floor_um"]
     assert found["refitted"] == []
 
 

@@ -1,6 +1,4 @@
-"""Shrinkage of the gap on held-out runs by the named causes, its attainable value, and the nuisances that were
-re-fitted.
-"""
+"""Shrinkage of the gap on held-out runs by the named causes, and the nuisances that were re-fitted."""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,8 +15,6 @@ from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
-
-_STEP = 0.02  # of an interval's half width, for differences of the gap
 
 
 def shrinkage_of(
@@ -46,34 +42,10 @@ def shrinkage_of(
 
     per_step = [squares(count) for count in range(len(members) + 1)]
     candidates = [problem.columns.candidates[i] for i in members]
-    found = unseen_shrinkage(
+    return unseen_shrinkage(
         [JudgedRun(each) for each in zip(*per_step, strict=True)], [(c.name, c.target) for c in candidates],
         holdout=tuple(run.name for run in seen.runs), noise_floor_um=round(floor_um, 3), refitted=tuple(named),
     )  # fmt: skip
-    ceiling, before = _ceiling(problem, best, seen, part, free), found.before_rms_um
-    ratio = round(1.0 - ceiling / before, 4) if before > 0 else 0.0
-    return found.model_copy(update={"ceiling_rms_um": round(ceiling, 3), "ceiling_ratio": ratio})
-
-
-def _ceiling(problem: Problem, best: Fitted, seen: Bench, part: slice, free: Sequence[Floats]) -> float:
-    """rms, um, that the same causes leave when they are fitted to the held-out runs themselves."""
-
-    def gaps(theta: Floats) -> list[Floats]:
-        causes = problem.causes(best.members, theta, best.extra)
-        return _without([seen.gap(k, causes)[:, part] for k in range(len(seen.runs))], free)
-
-    here = np.concatenate([gap.ravel() for gap in gaps(best.theta)])
-    known = np.isfinite(here)
-    if len(best.theta):
-        steps = np.maximum(_STEP * 2.0 * np.sqrt(np.diag(best.covariance)), 1e-6)
-        moved = [np.concatenate([gap.ravel() for gap in gaps(best.theta + step)]) for step in np.diag(steps)]
-        D = np.stack([(m - here)[known] / s for m, s in zip(moved, steps, strict=True)], axis=1)
-        change = np.linalg.lstsq(D, -here[known], rcond=1e-9)[0]
-        here = np.concatenate([gap.ravel() for gap in gaps(best.theta + change)])
-    squares = here**2
-    width = part.stop - part.start
-    rows = max(float(np.isfinite(squares.reshape(-1, width)).any(axis=1).sum()), 1.0)
-    return 1e3 * float(np.sqrt(np.nansum(squares) / rows))
 
 
 def _nuisances(seen: Bench, fitted: Sequence[Run], part: slice) -> tuple[list[Floats], list[str]]:

@@ -1,9 +1,6 @@
-"""Where and along which direction the gap of every run is largest: directions of travel, screw periods, frequencies and
-regions of the workspace.
-"""
+"""The gap of every run in the channels that its place is judged by."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -13,12 +10,11 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.noise_model import effective_rows
-from camcomp.diagnosis.statistics.periods import SpectralLine, screws
 from camcomp.model.effect import Cause
 
 
 def run_gaps(problem: Problem, causes: Sequence[Cause] = ()) -> list[places.RunGap]:
-    """Every run's gap, or what causes leave of it, in the main channels, with where the machine was and how it moved."""
+    """Every run's gap, or what causes leave of it, in the main channels."""
     part = main_channels(problem)
     m = len(problem.bench.actuators)
     out = []
@@ -33,10 +29,6 @@ def run_gaps(problem: Problem, causes: Sequence[Cause] = ()) -> list[places.RunG
             drives = np.einsum("nij,nj->ni", np.linalg.pinv(slope), clean)
         else:
             drives = gap if gap.shape[1] == m else np.zeros((len(gap), m))
-        motion = problem.bench.nominal[k].motion
-        tip, position, direction = (
-            thinned(v, run.thin) for v in (problem.bench.nominal[k].tip, motion.encoder, motion.direction)
-        )
         noise = np.where(np.isfinite(noise), np.hypot(noise, REPEATABILITY_MM if part.start == 0 else 0.0), 1.0)
         out.append(
             places.RunGap(
@@ -47,9 +39,6 @@ def run_gaps(problem: Problem, causes: Sequence[Cause] = ()) -> list[places.RunG
                 time=problem.times[k],
                 line=line,
                 drives=drives,
-                tip=tip,
-                position=position,
-                direction=direction,
             )
         )
     return out
@@ -58,21 +47,3 @@ def run_gaps(problem: Problem, causes: Sequence[Cause] = ()) -> list[places.RunG
 def channel_axes(problem: Problem) -> list[str]:
     """Names of the main channels: x, y, z of the tip, or the actuators."""
     return ["x", "y", "z"] if main_channels(problem).start == 0 else list(problem.bench.actuators)
-
-
-def patterns_of(problem: Problem, gaps: list[places.RunGap], heard: Sequence[SpectralLine]) -> dict[str, Any]:
-    """Dependence of the gap on the direction of travel, the turns of the screws, time, and the region of the
-    workspace.
-    """
-    actuators = problem.bench.actuators
-    return {
-        "travel": places.travel(gaps, actuators),
-        "screws": [_line(each, "actuator", "period_mm") for each in screws(gaps, actuators)],
-        "frequencies": [_line(each, "axis", "hertz") for each in heard],
-        "places": places.places(gaps),
-    }
-
-
-def _line(line: SpectralLine, whose: str, at: str) -> dict[str, Any]:
-    size = round(1e3 * line.amplitude, 3)
-    return {whose: line.name, at: round(line.at, 4), "amplitude_um": size, "share": round(line.share, 4)}

@@ -17,7 +17,6 @@ from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.folds import REGIONS, without_nuisances
-from camcomp.diagnosis.model.group import split_regions
 from camcomp.diagnosis.model.noise import HEALTHY, LEAST_VALUES, MINOR
 from camcomp.diagnosis.model.verdict import decide
 from camcomp.diagnosis.result.types import (
@@ -28,7 +27,6 @@ from camcomp.diagnosis.result.types import (
     IntervalShare,
     MinorEffect,
     NamedCause,
-    PlaceShare,
     UnknownCause,
     Where,
 )
@@ -136,9 +134,7 @@ def alternatives(case: PoseCase, named: Sequence[FoundCause]) -> tuple[tuple[Nam
 
 
 def where(case: PoseCase, word: str) -> Where:
-    """Shares of axes and actuators; for an unknown cause its covariates, and the intervals and regions above the
-    noise.
-    """
+    """Shares of axes and actuators; for an unknown cause its covariates, and the intervals above the noise."""
     energy = (np.concatenate(list(case.gaps)) ** 2).sum(axis=0)
     actuators = dict.fromkeys(case.bench.actuators, 0.0)
     stages: dict[str, float] = {}
@@ -157,7 +153,6 @@ def where(case: PoseCase, word: str) -> Where:
         actuators={name: round(size / total, 4) for name, size in actuators.items()},
         drivers=drivers(case, intervals) if word == "unknown" else (),
         intervals=intervals,
-        places=_places_above(case) if word == "unknown" else (),
     )
 
 
@@ -243,24 +238,6 @@ def _intervals(case: PoseCase) -> tuple[IntervalShare, ...]:
                         run=run, t0_s=float(time.min()), t1_s=float(time.max()), share=round(energy / whole, 4)
                     )
                 )
-    return tuple(sorted(out, key=lambda each: -each.share))
-
-
-def _places_above(case: PoseCase) -> tuple[PlaceShare, ...]:
-    """Parts of the workspace, boxes in the machine frame, in which the residual is larger than elsewhere."""
-    bench = case.bench
-    point = np.concatenate([bench.standing(bench.campaigns[k], ()).hung.point for k in bench.own])
-    square = np.concatenate([(r**2).sum(axis=1) for r in case.rest])
-    group = split_regions(point, REGIONS)
-    parts = [np.flatnonzero(group == g) for g in np.unique(group)]
-    whole = max(float(square.sum()), 1e-300)
-    out = []
-    for i in standing_out(square, parts):
-        own = parts[i]
-        x, y, z = ((_round(a.min()), _round(a.max())) for a in point[own].T)
-        size = 1e3 * float(np.sqrt(square[own].mean()))
-        share = round(float(square[own].sum()) / whole, 4)
-        out.append(PlaceShare(x_mm=x, y_mm=y, z_mm=z, share=share, rms_um=_round(size)))
     return tuple(sorted(out, key=lambda each: -each.share))
 
 

@@ -39,8 +39,8 @@ def _unchanged(unseen: UnseenShrinkage) -> UnseenShrinkage:
     before = unseen.before_rms_um
     actuators = {n: a.model_copy(update={"after_rms": a.before_rms}) for n, a in unseen.actuators.items()}
     return unseen.model_copy(
-        update={"after_rms_um": before, "ratio": 0.0, "ci95": (0.0, 0.0), "steps": (), "ceiling_rms_um": before,
-                "ceiling_ratio": 0.0, "covered_rms_um": None, "actuators": actuators}
+        update={"after_rms_um": before, "ratio": 0.0, "ci95": (0.0, 0.0), "steps": (), "covered_rms_um": None,
+                "actuators": actuators}
     )  # fmt: skip
 
 

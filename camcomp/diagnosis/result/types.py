@@ -102,23 +102,6 @@ class StretchDriver(Driver):
     unit: Literal["mm", "rad"]
 
 
-class DirectionShares(Result):
-    """Shares of the gap, as motion of one actuator, by direction: independent, changing sign, shortly after reversals."""
-
-    both_ways: Share
-    with_direction: Share
-    after_reversal: Share
-
-
-class ScrewLine(Result):
-    """A line of the gap's spectrum over the travel of an actuator."""
-
-    actuator: str
-    period_mm: float
-    amplitude_um: float
-    share: Share
-
-
 class FrequencyLine(Result):
     """A line of the gap's spectrum over time."""
 
@@ -128,18 +111,8 @@ class FrequencyLine(Result):
     share: Share
 
 
-class PlaceShare(Result):
-    """A region of the workspace with a gap above the noise."""
-
-    x_mm: Pair
-    y_mm: Pair
-    z_mm: Pair
-    share: Share
-    rms_um: float
-
-
 class Where(Result):
-    """Stage at which the gap arises, and its distribution over axes, lines, times and regions."""
+    """Stage at which the gap arises, and its distribution over axes, lines and times."""
 
     stage: Stage
     axes: dict[str, Share]
@@ -147,10 +120,7 @@ class Where(Result):
     lines: tuple[LineShare, ...] = ()
     intervals: tuple[IntervalShare, ...] = ()
     drivers: tuple[RippleDriver | StretchDriver | Driver, ...] = ()
-    travel: dict[str, DirectionShares] = Field(default_factory=dict)
-    screws: tuple[ScrewLine, ...] = ()
     frequencies: tuple[FrequencyLine, ...] = ()
-    places: tuple[PlaceShare, ...] = ()
 
 
 class NamedCause(Result):
@@ -264,7 +234,7 @@ class ShrinkageStep(NamedCause):
 
 
 class UnseenShrinkage(Result):
-    """Shrinkage of the gap on withheld runs or campaigns, and its upper bound."""
+    """Shrinkage of the gap on withheld runs or campaigns."""
 
     holdout: tuple[str, ...]
     before_rms_um: float
@@ -273,8 +243,6 @@ class UnseenShrinkage(Result):
     ci95: Pair
     steps: tuple[ShrinkageStep, ...] = ()
     noise_floor_um: float | None = None
-    ceiling_rms_um: Annotated[float | None, Field(description="left when the causes are fitted to these runs")] = None
-    ceiling_ratio: float | None = None
     covered_share: Annotated[
         float | None, Field(description="of unseen poses of an arm: every joint at angles its error curve was seen at")
     ] = None

@@ -1,8 +1,8 @@
-"""What repeats in the gap: with the turn of a screw, or in time at one frequency.
+"""Which vibrations show in the gap: lines at one frequency in time.
 
-Sines of every period are fitted by least squares beside a smooth trend; a line counts where chance would not make it
-among all the periods tried. A screw's line has to be there in both directions of travel, a vibration's in runs of
-different speed. Source: least-squares spectra (Scargle, Astrophysical Journal 263, 1982), Bonferroni over periods.
+Sines of every period are fitted by least squares jointly with a smooth trend; a line counts where chance would not make
+it among all the periods tried, in runs of different speed. Source: least-squares spectra (Scargle, Astrophysical Journal
+263, 1982), Bonferroni over periods.
 """
 
 from collections.abc import Sequence
@@ -20,20 +20,18 @@ _AT_ONCE = 1_000_000  # values held in memory
 
 @dataclass(frozen=True, eq=False)
 class SpectralLine:
-    """A sine in the gap: whose (actuator or axis), its period (mm) or frequency (Hz), amplitude mm, share of the energy."""
+    """A sine in the gap: its axis, frequency, amplitude (mm), and share of the energy."""
 
     name: str
-    at: float
+    hertz: float
     amplitude: float
     share: float
 
 
-def _trend(x: Floats, signs: Floats | None) -> Floats:
-    """Columns (n, k) of polynomials in x (n,), separate for each direction of travel."""
-    span = max(float(np.ptp(x)), 1e-9)
-    u = 2.0 * (x - x.min()) / span - 1.0
-    powers = u[:, None] ** np.arange(_TREND)
-    return powers if signs is None else np.concatenate([powers, powers * signs[:, None]], axis=1)
+def _trend(x: Floats) -> Floats:
+    """Columns (n, k) of polynomials in x (n,)."""
+    u = 2.0 * (x - x.min()) / max(float(np.ptp(x)), 1e-9) - 1.0
+    return np.asarray(u[:, None] ** np.arange(_TREND))
 
 
 def _spectrum(y: Floats, x: Floats, frequencies: Floats, trend: Floats) -> tuple[Floats, float]:
@@ -57,36 +55,12 @@ def _spectrum(y: Floats, x: Floats, frequencies: Floats, trend: Floats) -> tuple
     return np.concatenate(found), float(rest @ rest)
 
 
-def screws(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLine]:
-    """Lines at one period of an actuator's own travel, the gap read as motion of its carriage."""
-    found, whole = [], sum(float((r.drives**2).sum()) for r in runs)
-    for j, name in enumerate(names):
-        y, x, way = (np.concatenate([getattr(r, of)[:, j] for r in runs]) for of in ("drives", "position", "direction"))
-        sign = np.sign(way)
-        steps = np.concatenate([np.abs(np.diff(r.position[:, j])) for r in runs if len(r.time) > 1] or [np.zeros(1)])
-        span, step = float(np.ptp(x)), float(np.quantile(steps, 0.9))
-        if span <= 0.0 or step <= 0.0 or len(y) < 30:
-            continue
-        tried = np.arange(0.5 * _TREND / span, min(1.0 / (2.0 * step), 2.0), 0.25 / span)
-        trend = _trend(x, sign)
-        part = y, x, float(np.mean([r.thin for r in runs])), trend
-        if (line := _line([part], tried, len(names))) is None:
-            continue
-        f, energy = line
-        near = f + 0.25 / span * np.linspace(-1.0, 1.0, 21)
-        f = float(near[int(np.argmax(_spectrum(y, x, near, trend)[0]))])
-        ways = [_wave(y[sign * s > 0], x[sign * s > 0], f) for s in (1.0, -1.0) if (sign * s > 0).sum() > 15]
-        if len(ways) == 2 and abs(ways[0] - ways[1]) <= 0.5 * (abs(ways[0]) + abs(ways[1])):
-            found.append(SpectralLine(name, 1.0 / f, abs(sum(ways)) / 2.0, energy / max(whole, 1e-300)))
-    return sorted(found, key=lambda line: -line.share)
-
-
 def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLine]:
     """Lines at one frequency in time, in the channels of the gap; phases differ from run to run."""
     found, whole = [], sum(float(np.nansum(r.gap**2)) for r in runs)
     for j, name in enumerate(names):
         known = [(r, np.isfinite(r.gap[:, j])) for r in runs]
-        parts = [(r.gap[on, j], r.time[on], r.thin, _trend(r.time[on], None)) for r, on in known if on.sum() > 30]
+        parts = [(r.gap[on, j], r.time[on], r.thin, _trend(r.time[on])) for r, on in known if on.sum() > 30]
         if not parts:
             continue
         spans = [float(np.ptp(t)) for _, t, *_ in parts]
@@ -122,6 +96,6 @@ def _line(
 
 def _wave(y: Floats, x: Floats, f: float) -> complex:
     """Amplitude and phase of the sine at frequency f in y (n,) over x (n,), fitted jointly with a trend."""
-    columns = np.column_stack([np.sin(2 * np.pi * f * x), np.cos(2 * np.pi * f * x), _trend(x, None)])
+    columns = np.column_stack([np.sin(2 * np.pi * f * x), np.cos(2 * np.pi * f * x), _trend(x)])
     a = np.linalg.lstsq(columns, y, rcond=1e-9)[0]
     return complex(a[0], a[1])

@@ -15,14 +15,12 @@ from camcomp.ground.datatypes import Floats, Ints
 
 FALSE = 0.01  # share of discoveries that are none
 _BIN_S = 0.4
-_CLOSE_MM = 3.0  # behind a reversal
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunGap:
     """One run: gap (n, 3) mm of the tip (or (n, m) of the encoders), noise (3 or m,) mm, rows per independent one,
-    time (n,), line (n,) (NaN unknown), drives: the gap as motion of the carriages (n, m). tip (n, 3): where the model is,
-    program frame; position, direction (n, m): of the actuators, direction as in Motion.
+    time (n,), line (n,) (NaN unknown), drives: the gap as motion of the carriages (n, m).
     """
 
     name: str
@@ -32,9 +30,6 @@ class RunGap:
     time: Floats
     line: Floats
     drives: Floats
-    tip: Floats
-    position: Floats
-    direction: Floats
 
 
 def shares(values: Mapping[str, float]) -> dict[str, float]:
@@ -128,50 +123,3 @@ def intervals(runs: Sequence[RunGap], most: int = 12) -> list[dict[str, object]]
         for run, rows in joined
     ]  # fmt: skip
     return [{name: v for name, v in each.items() if name != "rms_um"} for each in _largest(runs, named, most)]
-
-
-def travel(runs: Sequence[RunGap], names: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Per actuator, of the gap read as motion of its carriage: the shares that do not depend on the direction of travel, that
-    turn round with it, and that follow a reversal closely (what is left of the first millimetres behind one).
-    """
-    out = {}
-    for j, name in enumerate(names):
-        y = np.concatenate([r.drives[:, j] for r in runs])
-        sign = np.concatenate([np.sign(np.round(r.direction[:, j], 2)) for r in runs])
-        behind = np.concatenate([_behind(r.position[:, j], np.sign(np.round(r.direction[:, j], 2))) for r in runs])
-        moving = sign != 0
-        same = np.full(len(y), y[moving].mean() if moving.any() else 0.0)
-        ways = [y[sign == s].mean() if (sign == s).any() else 0.0 for s in (1.0, -1.0)]
-        odd = 0.5 * (ways[0] - ways[1]) if (sign > 0).any() and (sign < 0).any() else 0.0
-        rest = y - same - odd * sign
-        close = behind < _CLOSE_MM
-        extra = float((rest[close] ** 2).sum()) - close.mean() * float((rest**2).sum())
-        whole = float((y**2).sum())
-        out[name] = {
-            "both_ways": round(float((same**2).sum()) / whole, 4) if whole > 0 else 0.0,
-            "with_direction": round(float(((odd * sign) ** 2).sum()) / whole, 4) if whole > 0 else 0.0,
-            "after_reversal": round(max(float(extra), 0.0) / whole, 4) if whole > 0 else 0.0,
-        }
-    return out
-
-
-def _behind(x: Floats, sign: Floats) -> Floats:
-    """Travel (n,) since the last reversal of x (n,); inf before the first."""
-    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))])
-    turned = np.concatenate([[False], (sign[1:] != sign[:-1]) & (sign[1:] != 0) & (sign[:-1] != 0)])
-    return gone - np.maximum.accumulate(np.where(turned, gone, -np.inf))
-
-
-def places(runs: Sequence[RunGap], most: int = 6) -> list[dict[str, object]]:
-    """Regions of the workspace (thirds of the visited range, per axis) where the gap exceeds the noise, by share."""
-    tips = np.concatenate([r.tip for r in runs])
-    low, span = tips.min(axis=0), np.ptp(tips, axis=0)
-    parts = np.where(span > 1.0, 3, 1)
-    found: list[Labelled] = []
-    for cell in np.ndindex(*parts):
-        a, b = (low + span * (np.array(cell) + end) / parts for end in (0, 1))
-        inside = [(r, np.flatnonzero(((r.tip >= a - 1e-9) & (r.tip <= b + 1e-9)).all(axis=1))) for r in runs]
-        if any(len(rows) for _, rows in inside):
-            box = {f"{axis}_mm": [round(float(end[i]), 2) for end in (a, b)] for i, axis in enumerate("xyz")}
-            found.append((box, inside))
-    return _largest(runs, _standing_out(found), most)
