@@ -18,7 +18,7 @@ from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
 from camcomp.diagnosis.fit.starts import Nuisance, start_columns
 from camcomp.diagnosis.model.noise import HEALTHY, REPEATABILITY_MM
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.evidence import Prior
+from camcomp.diagnosis.statistics.cause_sets import Prior
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError
@@ -148,13 +148,15 @@ def build(
     names: list[str] = []
     tolerance: list[float] = []
     sign: list[float] = []
+    unit: list[float] = []
     parts: list[list[Floats]] = []
 
-    def put(who: int, name: str, size: float, per_run: list[Floats], *, signed: int = 0) -> None:
+    def put(who: int, name: str, size: float, per_run: list[Floats], *, signed: int = 0, of_floor: float = 1.0) -> None:
         owner.append(who)
         names.append(name)
         tolerance.append(size)
         sign.append(float(signed))
+        unit.append(of_floor)
         parts.append(per_run)
 
     for i, candidate in enumerate(steps(candidates, len(candidates))):
@@ -163,8 +165,8 @@ def build(
             candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
             strict=True,
         ):
-            size = healthy_size(bench, candidate, p, per_run, floor_um)
-            put(i, f"{candidate.label}.{p.name}", size, per_run, signed=p.sign)
+            size, of_floor = healthy_size(bench, candidate, p, per_run, floor_um)
+            put(i, f"{candidate.label}.{p.name}", size, per_run, signed=p.sign, of_floor=of_floor)
     for name, size, per_run in _nuisances(bench):
         if name.startswith("spring."):  # a soft machine has no more of it than of anything else
             size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
@@ -175,18 +177,21 @@ def build(
         for r in range(len(bench.runs))
     )
     bench.columns.clear()  # they stand in the blocks now
-    prior = Prior(np.array(tolerance), np.array(sign))
+    prior = Prior(np.array(tolerance), np.array(sign), np.array(unit))
     return Columns(tuple(candidates), np.array(owner), tuple(names), prior, blocks)
 
 
 def healthy_size(
     bench: Bench, candidate: CandidateCause, p: Parameter, per_run: Sequence[Floats], floor_um: float
-) -> float:
-    """Standard deviation of a parameter on healthy machines, in its scales; per_run: its columns (n, c)."""
-    healthy = HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9)
+) -> tuple[float, float]:
+    """Standard deviation of a parameter on healthy machines, and its size that moves the tip by a floor, in its scales; per_run:
+    its columns (n, c).
+    """
+    of_floor = min(floor_um / max(tip_um(bench, per_run), 1e-9), MOST_HEALTHY / HEALTHY)
+    healthy = HEALTHY * of_floor
     if any(each.placed for each in candidate.shapes):  # nothing happens for a while to every healthy machine
         healthy = min(healthy, p.tolerance / p.scale)
-    return min(healthy, MOST_HEALTHY)
+    return healthy, of_floor
 
 
 def tip_um(bench: Bench, per_run: Sequence[Floats]) -> float:

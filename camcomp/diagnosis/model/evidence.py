@@ -9,13 +9,14 @@ Source: George, McCulloch, Statistica Sinica 7 (1997) 339; half-normal slabs whe
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import comb, log
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri
 from scipy.special import log_ndtr
 
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
@@ -26,10 +27,10 @@ from camcomp.diagnosis.model.group import (
     normal_equations,
 )
 from camcomp.diagnosis.model.noise import HEALTHY
-from camcomp.diagnosis.statistics.cause_sets import SIZES
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
 from camcomp.ground.datatypes import Floats, Ints
 
+SIZES = (0.45, 0.33, 0.13, 0.055, 0.022, 0.009, 0.004)  # prior probability of 0, 1, 2 ... causes
 WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: effect of a cause on the channels
 LONG = 20  # columns: a longer candidate has no small errors
 FREE = 1e-6  # precision of nuisances in units of their columns
@@ -210,8 +211,16 @@ class LinearModel:
             own, by = at.without(effects)
             gram, moment = np.zeros((k, k)), np.zeros(k)
             gram[np.ix_(effects, effects)], moment[effects] = own, by
-            self._reduced[background] = Reduced(self, gram, moment, at.log_evidence)
+            self._reduced[background] = Reduced(
+                gram=gram, moment=moment, none=at.log_evidence, candidates=self.candidates, bounds=self.bounds,
+                units=[self.unit(np.array(c.columns, int)) for c in self.candidates], log_prior=self.log_prior,
+            )  # fmt: skip
         return self._reduced[background]
+
+    def log_prior(self, members: Members) -> float:
+        """Log prior of a set: its number of causes, places equally likely, shapes of a place equally likely."""
+        places, ways = len({c.place for c in self.candidates}), sum(log(self.candidates[i].ways) for i in members)
+        return log(SIZES[len(members)]) - log(comb(places, len(members))) - ways
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -246,10 +255,14 @@ class AmplitudePosterior:
     def covariance(self, columns: Sequence[int]) -> Floats:
         """Covariance (d, d) of some of the live columns."""
         at = np.searchsorted(self.live, columns)
-        right = np.zeros((len(self.live), len(at)))
-        right[at, np.arange(len(at))] = 1.0
-        own = cho_solve(self.factor, right)[at]
-        return np.asarray(self.scale[at][:, None] * own * self.scale[at], float)
+        return np.asarray(self._inverse[np.ix_(at, at)])
+
+    @cached_property
+    def _inverse(self) -> Floats:
+        """Covariance of all live columns."""
+        triangle = np.tril(dpotri(self.factor[0], lower=1)[0])
+        whole = triangle + np.tril(triangle, -1).T
+        return np.asarray(self.scale[:, None] * whole * self.scale)
 
     def without(self, columns: Ints) -> tuple[Floats, Floats]:
         """Normal equations (d, d), (d,) of further columns with all live ones integrated out."""
@@ -272,57 +285,51 @@ class AmplitudePosterior:
         return out
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Reduced:
-    """Normal equations of the effects (gram (k, k), moment (k,)), and the log evidence of no cause at all."""
+    """Normal equations of the effects (gram (k, k), moment (k,)), and the log evidence of no cause at all.
 
-    model: LinearModel
+    units: per candidate amplitudes (d,) at which it acts by one floor, its columns in equal parts, 0 where one is not seen.
+    log_prior: of a set.
+    """
+
     gram: Floats
     moment: Floats
     none: float
-
-    @cached_property
-    def _unit(self) -> list[Floats]:
-        """Amplitudes (d,) of every candidate at which it acts by one floor, its columns in equal parts."""
-        return [self.model.unit(np.array(c.columns, int)) for c in self.model.candidates]
-
-    @cached_property
-    def _places(self) -> int:
-        return len({c.place for c in self.model.candidates})
-
-    @property
-    def candidates(self) -> Sequence[PlacedCause]:
-        """All candidates."""
-        return self.model.candidates
+    candidates: Sequence[PlacedCause]
+    units: Sequence[Floats]
+    bounds: AmplitudeBounds
+    log_prior: Callable[[Members], float]
 
     @property
     def usable(self) -> list[int]:
         """Candidates all of whose columns are seen."""
-        return [i for i, unit in enumerate(self._unit) if unit.all()]
+        return [i for i, unit in enumerate(self.units) if unit.all()]
 
-    def units(self, members: Members) -> Floats:
+    def units_of(self, members: Members) -> Floats:
         """Amplitudes (d,) at which every member acts by one floor."""
-        return np.concatenate([np.zeros(0), *(self._unit[i] for i in members)])
+        return np.concatenate([np.zeros(0), *(self.units[i] for i in members)])
 
     def indices(self, members: Members) -> list[int]:
         """Columns of members, one after the other."""
-        return [j for i in members for j in self.model.candidates[i].columns]
+        return [j for i in members for j in self.candidates[i].columns]
 
-    def prior(self, members: Members) -> float:
-        """Log prior of a set: its number of causes, places equally likely, shapes of a place equally likely."""
-        ways = sum(log(self.model.candidates[i].ways) for i in members)
-        return log(SIZES[len(members)]) - log(comb(self._places, len(members))) - ways
+    def evidence(self, members: Members) -> float:
+        """Log evidence of a set."""
+        return float(self._evidence(members[:-1], members[-1:])[0]) if members else self.none
 
     def value(self, members: Members) -> float:
         """Log posterior of a set up to a constant, evidence and prior."""
-        if not members:
-            return self.none + self.prior(())
-        return float(self.with_one_more(members[:-1], members[-1:])[0])
+        return self.evidence(members) + self.log_prior(members)
 
     def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
         """Log posterior (s,) of a set with one candidate more each, up to a constant."""
-        out = np.array([self.none + self.prior((*members, i)) for i in more])
-        count = np.array([len(self.model.candidates[i].columns) for i in more])
+        return self._evidence(members, more) + [self.log_prior((*members, i)) for i in more]
+
+    def _evidence(self, members: Members, more: Sequence[int]) -> Floats:
+        """Log evidence (s,) of a set with one candidate more each."""
+        out = np.full(len(more), self.none)
+        count = np.array([len(self.candidates[i].columns) for i in more])
         for d in np.unique(count):
             own = np.flatnonzero(count == d)
             value = self._posterior(members, [more[i] for i in own.tolist()])[0]
@@ -336,7 +343,7 @@ class Reduced:
         """Amplitudes (d,), covariance (d, d) and the most probable width, small errors integrated out."""
         value, mean = self._posterior(members[:-1], members[-1:])
         w = int(np.argmax(value[0]))
-        on, unit = self.indices(members), self.units(members)
+        on, unit = self.indices(members), self.units_of(members)
         M = unit[:, None] * self.gram[np.ix_(on, on)] * unit + np.eye(len(on)) / WIDTHS[w] ** 2
         return mean[0, w], unit[:, None] * np.linalg.inv(M) * unit, WIDTHS[w]
 
@@ -345,15 +352,15 @@ class Reduced:
         if not members:
             return {}
         width = self.estimate(members)[2]
-        return dict(zip(self.indices(members), (width * self.units(members)).tolist(), strict=True))
+        return dict(zip(self.indices(members), (width * self.units_of(members)).tolist(), strict=True))
 
     def _posterior(self, members: Members, more: Sequence[int]) -> tuple[Floats, Floats]:
         """Log evidence (s, widths) and amplitudes (s, widths, d) of a set with one of s candidates more, each of e columns.
 
         The columns of the set are eliminated once.
         """
-        old, new = np.array(self.indices(members), int), np.array([self.model.candidates[i].columns for i in more])
-        a, b = self.units(members), np.array([self._unit[i] for i in more])
+        old, new = np.array(self.indices(members), int), np.array([self.candidates[i].columns for i in more])
+        a, b = self.units_of(members), np.array([self.units[i] for i in more])
         square = np.array(WIDTHS) ** 2
         A = a[:, None] * self.gram[np.ix_(old, old)] * a + np.eye(len(a)) / square[:, None, None]  # (widths, o, o)
         B = a[:, None] * self.gram[old[:, None], new[:, None, :]] * b[:, None, :]  # (s, o, e)
@@ -383,7 +390,7 @@ class Reduced:
 
     def _inside(self, mean: Floats, sd: Floats, on: np.ndarray) -> Floats:
         """Log share (s, widths) of the posterior that has the right signs; minus infinity far outside of the bounds."""
-        bounds = self.model.bounds
+        bounds = self.bounds
         signed = bounds.sign[on] > 0.0
         share = log_ndtr(np.where(signed, mean / np.maximum(sd, 1e-300), 0.0)) + log(2.0)
         out = np.where(signed, share, 0.0).sum(axis=2)

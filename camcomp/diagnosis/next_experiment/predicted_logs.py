@@ -19,8 +19,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import HIDDEN, LARGE
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.site import Site, site_of
-from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.evidence import estimate
+from camcomp.diagnosis.statistics.cause_sets import Fitted, estimate
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import CamcompError

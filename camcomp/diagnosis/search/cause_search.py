@@ -9,6 +9,7 @@ from camcomp.diagnosis.fit.gap import is_at_floor
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
+from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.model.search import ROUNDS
 from camcomp.diagnosis.model.verdict import Word, decide
@@ -18,11 +19,9 @@ from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplaine
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
-    Members,
     probabilities,
     temperature_of,
 )
-from camcomp.diagnosis.statistics.evidence import misfit
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
 from camcomp.diagnosis.statistics.score_test import Shares
 from camcomp.ground.datatypes import Floats
@@ -117,7 +116,7 @@ def _rank_answers(problem: Problem, sets: FittedSets) -> tuple[RankedSets, float
         best = fits[int(np.argmax(probability))]
         if best.members in sets.searched:
             break
-    return rank(fits, probability, _same(problem, fits, best)), temperature
+    return rank(fits, probability, _same(fits, best)), temperature
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,24 +223,10 @@ def _modelled(problem: Problem, f: Fitted) -> float:
     return min(MODELLED * max(together, *alone, 0.0), LEFT_OPEN * together)
 
 
-def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[Members]:
-    """Sets of the size of the best one that fit as well, whatever the priors say of them.
-
-    Priors of sizes, and of how far off the tolerances are all together: the rows and the stated tolerances have to tell.
-    """
-    found = []
-
-    def left(f: Fitted) -> float:
-        return misfit(f.data, problem.prior, problem.member_columns(f.members))
-
-    def of_their_signs(f: Fitted) -> bool:
-        parameters = [p for i in f.members for p in problem.columns.candidates[i].parameters]
-        return all(p.sign == 0 or t > 0 for t, p in zip(f.theta, parameters, strict=True))
-
-    for f in fits:
-        if f is best or len(f.members) != len(best.members) or not best.members:
-            continue
-        behind = 0.5 * (left(f) - left(best))
-        if min(behind, best.log_evidence - f.log_evidence) < EQUAL_LOG_ODDS and of_their_signs(f):
-            found.append(f.members)
-    return found
+def _same(fits: Sequence[Fitted], best: Fitted) -> list[Members]:
+    """Sets of the size of the best one that fit as well, whatever the prior says of them."""
+    return [
+        f.members
+        for f in fits
+        if f is not best and len(f.members) == len(best.members) and best.log_evidence - f.log_evidence < EQUAL_LOG_ODDS
+    ]

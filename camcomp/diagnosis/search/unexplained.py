@@ -19,8 +19,7 @@ from camcomp.diagnosis.fit.floor import row_scatter
 from camcomp.diagnosis.fit.outliers import TINY
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.evidence import estimate
+from camcomp.diagnosis.statistics.cause_sets import Fitted, estimate
 from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.diagnosis.statistics.probability import SURELY
 from camcomp.ground.datatypes import Bools, Floats
