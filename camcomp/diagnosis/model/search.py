@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Protocol
+from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.diagnosis.model.candidates import PlacedCause
-from camcomp.diagnosis.model.evidence import LONG, Members
-from camcomp.ground.datatypes import Floats
+from camcomp.diagnosis.model.evidence import LONG, Members, Reduced
 
 MOST = 5  # causes of a set
 ROUNDS = 6  # of searches about what was found, at most
@@ -22,25 +19,7 @@ def best_of(values: Mapping[Members, float]) -> Members:
     return max(values, key=lambda m: (values[m], m))
 
 
-class WeighedSets(Protocol):
-    """Log posteriors of sets of candidates, of which those `usable` may be members."""
-
-    @property
-    def candidates(self) -> Sequence[PlacedCause]:
-        """All candidates."""
-
-    @property
-    def usable(self) -> Sequence[int]:
-        """Candidates that the data can show."""
-
-    def value(self, members: Members) -> float:
-        """Log posterior of a set, up to a constant."""
-
-    def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
-        """Log posterior (m,) of a set with one of `more` each."""
-
-
-def search_sets(data: WeighedSets, most: int = MOST) -> dict[Members, float]:
+def search_sets(data: Reduced, most: int = MOST) -> dict[Members, float]:
     """Sets of up to `most` causes with their log posteriors.
 
     A set has at most one candidate of more than LONG columns, which is tried with the best set of each size.
