@@ -355,37 +355,18 @@ class Reduced:
         return dict(zip(self.indices(members), (width * self.units_of(members)).tolist(), strict=True))
 
     def _posterior(self, members: Members, more: Sequence[int]) -> tuple[Floats, Floats]:
-        """Log evidence (s, widths) and amplitudes (s, widths, d) of a set with one of s candidates more, each of e columns.
-
-        The columns of the set are eliminated once.
-        """
-        old, new = np.array(self.indices(members), int), np.array([self.candidates[i].columns for i in more])
-        a, b = self.units_of(members), np.array([self.units[i] for i in more])
+        """Log evidence (s, widths) and amplitudes (s, widths, d) of a set with one of s candidates more, each of e columns."""
+        old = np.array(self.indices(members), int)
+        on = np.array([[*old, *self.candidates[i].columns] for i in more])
+        unit = np.array([[*self.units_of(members), *self.units[i]] for i in more])
         square = np.array(WIDTHS) ** 2
-        A = a[:, None] * self.gram[np.ix_(old, old)] * a + np.eye(len(a)) / square[:, None, None]  # (widths, o, o)
-        B = a[:, None] * self.gram[old[:, None], new[:, None, :]] * b[:, None, :]  # (s, o, e)
-        C = b[:, :, None] * self.gram[new[:, :, None], new[:, None, :]] * b[:, None, :]
-        P = np.linalg.inv(A)
-        alone = P @ (a * self.moment[old])  # (widths, o)
-        taken = np.einsum("wop,spe->swoe", P, B, optimize=True)
-        S = C[:, None] + np.eye(b.shape[1]) / square[:, None, None]
-        S = S - np.einsum("soe,swof->swef", B, taken, optimize=True)
-        Q = np.linalg.inv(S)
-        left = (b * self.moment[new])[:, None] - np.einsum("soe,wo->swe", B, alone, optimize=True)
-        gained = (Q @ left[..., None])[..., 0]
-        value = 0.5 * ((alone @ (a * self.moment[old]))[None] + (left * gained).sum(axis=2))
-        value -= 0.5 * (np.linalg.slogdet(A)[1] + np.linalg.slogdet(S)[1] + (len(a) + b.shape[1]) * np.log(square))
-        mean = np.concatenate([alone[None] - (taken @ gained[..., None])[..., 0], gained], axis=2)
-        variance = np.concatenate(
-            [
-                np.diagonal(P, axis1=1, axis2=2)[None] + ((taken @ Q) * taken).sum(axis=3),
-                np.diagonal(Q, axis1=2, axis2=3),
-            ],
-            axis=2,
-        )
-        on = np.concatenate([np.broadcast_to(old, (len(new), len(old))), new], axis=1)[:, None, :]
-        unit = np.concatenate([np.broadcast_to(a, (len(b), len(a))), b], axis=1)[:, None, :]
-        mean, sd = unit * mean, unit * np.sqrt(np.maximum(variance, 0.0))
+        G = unit[:, :, None] * self.gram[on[:, :, None], on[:, None]] * unit[:, None]
+        M, h = G[:, None] + np.eye(on.shape[1]) / square[:, None, None], (unit * self.moment[on])[:, None]
+        C = np.linalg.inv(M)
+        mean = (C @ h[..., None])[..., 0]
+        value = 0.5 * (h * mean).sum(axis=2) - 0.5 * (np.linalg.slogdet(M)[1] + on.shape[1] * np.log(square))
+        sd = np.sqrt(np.maximum(np.diagonal(C, axis1=2, axis2=3), 0.0))
+        mean, sd, on = unit[:, None] * mean, unit[:, None] * sd, on[:, None]
         return value + self._inside(mean, sd, on), mean
 
     def _inside(self, mean: Floats, sd: Floats, on: np.ndarray) -> Floats:
