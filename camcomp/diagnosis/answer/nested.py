@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from camcomp.diagnosis.fit.cause_sets import Fitted, parts_of, temperature_of, weighed
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import MOST_SETS
 from camcomp.diagnosis.model.evidence import Members
-from camcomp.diagnosis.statistics.cause_sets import Fitted, parts_of, temperature_of, weighed
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import thinned
+from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.outliers import medians
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.window import TRAVEL_BINS
 from camcomp.diagnosis.result.types import Driver, StretchDriver
-from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 
 

@@ -11,13 +11,13 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
+from camcomp.diagnosis.fit.cause_sets import Prior
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
 from camcomp.diagnosis.fit.starts import Nuisance, start_columns
 from camcomp.diagnosis.model.noise import HEALTHY, REPEATABILITY_MM
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Prior
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError

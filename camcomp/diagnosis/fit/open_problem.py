@@ -7,6 +7,7 @@ from math import prod
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, thinned
+from camcomp.diagnosis.fit.cause_sets import CausePrior, estimate
 from camcomp.diagnosis.fit.columns import (
     Columns,
     build,
@@ -26,7 +27,6 @@ from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, estimate
 from camcomp.diagnosis.statistics.folds import Folds, Split
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.diagnosis.statistics.normal_equations import sum_grams

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, cause_of, step_of
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, Prior, estimate, weighed
 from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
 from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
@@ -16,7 +17,6 @@ from camcomp.diagnosis.model.discrepancy import ROWS_OF_PROCESS
 from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Prior, estimate, weighed
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, gram, sum_grams
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camcomp.diagnosis.fit.cause_sets import FREE, Fitted, Prior, temperature_of, weighed
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import TermBench, spots
@@ -18,7 +19,6 @@ from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.result.types import Law
 from camcomp.diagnosis.search.unknown import firm_prior
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import FREE, Fitted, Prior, temperature_of, weighed
 from camcomp.diagnosis.statistics.folds import Folds, Split, usual_split
 from camcomp.ground.datatypes import Floats
 

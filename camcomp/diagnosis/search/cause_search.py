@@ -5,6 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camcomp.diagnosis.fit.cause_sets import (
+    Fitted,
+    probabilities,
+    temperature_of,
+)
 from camcomp.diagnosis.fit.gap import is_at_floor
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
@@ -15,15 +20,10 @@ from camcomp.diagnosis.model.search import ROUNDS
 from camcomp.diagnosis.model.verdict import Word, decide
 from camcomp.diagnosis.search.credible import MODELLED, credibility
 from camcomp.diagnosis.search.fitted_sets import FittedSets
+from camcomp.diagnosis.search.score_test import Shares
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
-from camcomp.diagnosis.statistics.cause_sets import (
-    Fitted,
-    probabilities,
-    temperature_of,
-)
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
-from camcomp.diagnosis.statistics.score_test import Shares
 from camcomp.ground.datatypes import Floats
 
 LEFT_OPEN = 0.25  # of what causes explain together: no set explains what leaves more, however large its members are

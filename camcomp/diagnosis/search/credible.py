@@ -21,16 +21,16 @@ from math import log
 import numpy as np
 from scipy.special import logsumexp
 
+from camcomp.diagnosis.fit.cause_sets import Fitted, parts_of, weighed
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.discrepancy import UNKNOWN, gains_at_scales
 from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.noise import MINOR
+from camcomp.diagnosis.search.score_test import JointProducts
 from camcomp.diagnosis.search.unknown import joint_products, process_in_time
-from camcomp.diagnosis.statistics.cause_sets import Fitted, parts_of, weighed
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.diagnosis.statistics.probability import TEMPERATURE
-from camcomp.diagnosis.statistics.score_test import JointProducts
 from camcomp.ground.datatypes import Floats, Ints
 
 MODELLED = 0.1  # of what causes explain: none is modelled better than that

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from camcomp.diagnosis.fit.cause_sets import Fitted, estimate, weighed
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.search import search_sets
-from camcomp.diagnosis.statistics.cause_sets import Fitted, estimate, weighed
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground import progress
 

@@ -11,9 +11,9 @@ from itertools import permutations
 import numpy as np
 from scipy.linalg import eigh
 
+from camcomp.diagnosis.fit.cause_sets import FREE, estimate
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import HIDDEN, LARGE
-from camcomp.diagnosis.statistics.cause_sets import FREE, estimate
 from camcomp.diagnosis.statistics.normal_equations import sum_grams
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, Prior, estimate, weighed
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.search.cause_search import _same
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Prior, estimate, weighed
 from camcomp.diagnosis.statistics.normal_equations import gram
 
 

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, Prior
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.search import credible
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Prior
 
 ROWS = 400
 U = np.linspace(0.0, 1.0, ROWS)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Prior, weighed
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.search import best_of, search_sets
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Prior, weighed
 from camcomp.diagnosis.statistics.normal_equations import gram
 
 FORCE, WEIGHT, LENGTH, TWO = 4, 5, 6, 7  # 0 to 3 are springs

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.answer.nested import causes_without
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, Prior, estimate, probabilities, weighed
 from camcomp.diagnosis.model.candidates import PlacedCause
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Prior, estimate, probabilities, weighed
 from camcomp.diagnosis.statistics.normal_equations import gram, sum_grams
 
 

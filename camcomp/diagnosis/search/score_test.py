@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camcomp.diagnosis.fit.cause_sets import Prior
 from camcomp.diagnosis.model.evidence import AmplitudePosterior
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Prior
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, gram, sum_grams
 from camcomp.ground.datatypes import Floats, Ints
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.fit.cause_sets import Prior
+from camcomp.diagnosis.search.score_test import JointProducts, explained
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Prior
-from camcomp.diagnosis.statistics.score_test import JointProducts, explained
 
 
 def test_a_pattern_given_twice_counts_once():

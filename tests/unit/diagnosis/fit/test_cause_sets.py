@@ -6,11 +6,11 @@ from math import comb
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, Prior, estimate, weighed
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.evidence import SIZES
 from camcomp.diagnosis.model.search import best_of, search_sets
 from camcomp.diagnosis.search.cause_search import rank
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Prior, estimate, weighed
 from camcomp.diagnosis.statistics.normal_equations import gram
 
 
