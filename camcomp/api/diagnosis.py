@@ -80,13 +80,11 @@ class ExperimentDiagnosis:
         """One HTML page with plots. Raises ConfigError CC216 without the plot library."""
         from camcomp.diagnosis.report.views import report_of
 
-        rows = self._residuals() if self.behind is None else None
         return report_of(
             file=self.file,
             result=self.result,
             done=self.behind,
             opened=self.opened,
-            residuals=rows,
             next_program=self._next_listing(),
         )
 

@@ -13,7 +13,6 @@ from camcomp.diagnosis.answer.held_out import shrinkage_of
 from camcomp.diagnosis.answer.locate import channel_axes, run_gaps
 from camcomp.diagnosis.answer.minor import MOST_LISTED, minor_effects
 from camcomp.diagnosis.answer.nested import causes_without
-from camcomp.diagnosis.answer.stretch import with_stretches
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
@@ -291,7 +290,7 @@ def _where(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer | 
         "actuators": places.actuators(gaps, problem.bench.actuators),
         "lines": places.lines(gaps),
         "intervals": places.intervals(left),
-        "drivers": with_stretches(_drivers(problem, found, heard), problem, best),
+        "drivers": _drivers(problem, found, heard),
         "frequencies": [
             {"axis": f.name, "hertz": round(f.hertz, 4), "amplitude_um": round(1e3 * f.amplitude, 3), "share": round(f.share, 4)}
             for f in heard

@@ -10,16 +10,16 @@ from html import unescape
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.report.figures import figure_causes, figure_map, figure_signed, figure_size
+from camcomp.diagnosis.report.figures import figure_map, figure_signed, figure_size
 from camcomp.diagnosis.report.page import diagnosis_html, verdict_text
-from camcomp.diagnosis.report.run_view import RivalSignals, likeness, rms, spectrum
-from camcomp.diagnosis.result.types import DiagnosisResult, FoundCause
+from camcomp.diagnosis.report.run_view import RivalSignals, likeness, rms
+from camcomp.diagnosis.result.types import DiagnosisResult
 from camcomp.report.inputs import Input
 from camcomp.report.page import Listing
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 from tests.report.browser import needs_browser
-from tests.report.diagnoses import cause, result, rivals, run_view, views
+from tests.report.diagnoses import result, rivals, run_view, views
 
 VERDICTS = ("none", "identified", "ambiguous", "unknown")
 
@@ -111,9 +111,9 @@ def test_the_map_has_one_scale_for_before_and_after():
     assert before["x"] == after["x"] and max(before["marker"]["color"]) > 5 * np.mean(after["marker"]["color"])
 
 
-def test_a_result_without_gap_draws_no_ladder_and_no_causes():
+def test_a_result_without_gap_draws_no_ladder():
     drawn = figures(html_of("none"))
-    assert "ladder" not in drawn and "causes-plot" not in drawn and "time-1" in drawn
+    assert "ladder" not in drawn and "time-1" in drawn
 
 
 def test_rows_without_measurement_are_gaps():
@@ -128,16 +128,12 @@ def test_inputs_stand_without_their_folders():
     assert "/home/me" not in html and "log a.csv 1 6b86b273ff34fce1" in words(html)
 
 
-def test_a_spectrum_finds_the_frequency_and_amplitude():
-    view = run_view("a", True, size=20.0, frequency=1.25)
-    frequency, amplitude = spectrum(view.time, view.before)
-    assert frequency[amplitude.argmax()] == pytest.approx(1.25, abs=0.05)
-    assert amplitude.max() == pytest.approx(20.0, rel=0.1)
-    holes = view.before.copy()
-    holes[::7] = np.nan
-    assert spectrum(view.time, holes)[1].max() == pytest.approx(20.0, rel=0.1)
-    assert len(spectrum(view.time[:10], view.before[:10])[0]) == 0
-    assert len(spectrum(np.zeros(100), view.before[:100])[0]) == 0
+def test_vibrations_stand_in_a_table():
+    found = result("identified")
+    shake = {"axis": "z", "hertz": 12.5, "amplitude_um": 4.2, "share": 0.31}
+    where = found.where.model_validate(found.where.model_dump() | {"frequencies": [shake]})
+    html = diagnosis_html(found.model_copy(update={"where": where}), [], title="e", machine="m").decode()
+    assert "z 12.5 4.20 31.0 %" in words(html)
 
 
 def test_likeness():
@@ -187,7 +183,7 @@ def test_in_a_browser(browser, tmp_path, verdict):
         "return [...document.querySelectorAll('.plot')].map(p => [p.id, p.dataset.drawn,"
         " p.querySelectorAll('path.js-line, .bars path, path.point').length])"
     )
-    assert len(drawn) == {"none": 7, "identified": 9, "ambiguous": 10, "unknown": 9}[verdict]
+    assert len(drawn) == {"none": 6, "identified": 7, "ambiguous": 8, "unknown": 7}[verdict]
     for name, done, marks in drawn:
         assert done == "yes" and marks, name
     assert browser.console() == []
@@ -221,14 +217,6 @@ def test_where_no_cause_takes_anything_no_curve_says_so():
     assert "no cause found takes any of it" in figure_size(bare, 1, 0.87).caption
     assert len(figure_map([bare]).traces) == 1 and len(figure_map([one]).traces) == 2
     assert not any("with the causes found" in each["name"] for each in figure_signed(bare, 1).traces)
-
-
-def test_no_bar_says_nought_of_what_is_there():
-    faint = result("identified").model_copy(
-        update={"causes": [FoundCause.model_validate(cause("backlash", "x", 0.99, 0.002))]}
-    )
-    share, probability = figure_causes(faint.causes).traces
-    assert (share["text"], probability["text"]) == (["less than 1 %"], ["99 %"])
 
 
 def test_the_law_of_an_unknown_effect_stands_on_the_first_screen():

@@ -41,17 +41,5 @@ def test_a_joint_is_drawn_with_its_band_and_only_where_it_was_seen():
     assert section.tables[0].rows[0][:4] == ["elbow", "100", "90 to 110", "25 %"]
 
 
-def test_unseen_poses_are_drawn_before_and_after_and_those_of_the_fit_are_not():
-    rows = {"run": np.array(["a", "a", "b", "b"])}
-    for kind, size in (("gap", 0.3), ("rest", 0.1)):
-        rows |= {
-            f"{kind}_{axis}_mm": np.array([9.0, 9.0, size, size]) if axis == "x" else np.zeros(4) for axis in "xyz"
-        }
-    before, after = joints_section(found(), rows).figures[0].traces
-    assert set(before["x"]) == {300.0} and set(after["x"]) == {100.0}
-    everything = {**rows, "run": np.array(["b", "b", "b", "b"])}
-    assert len(joints_section(found(), everything).figures) == 1
-
-
 def test_without_curves_there_is_no_such_part():
     assert joints_section(found().model_copy(update={"causes": ()})) is None

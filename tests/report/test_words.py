@@ -4,7 +4,7 @@ import pytest
 
 from camcomp.diagnosis.report.answer import MOST_CAUSES, answer_lines
 from camcomp.diagnosis.report.words import depends, percent, plain, remedy, shortened, size, sizes, term_size
-from camcomp.diagnosis.result.types import DiagnosisResult, Driver, Estimate, FoundCause, LawTerm, StretchDriver
+from camcomp.diagnosis.result.types import DiagnosisResult, Driver, Estimate, FoundCause, LawTerm
 from camcomp.ground import shelf
 from camcomp.report.plot import micrometres
 from tests.report.diagnoses import cause, result
@@ -89,8 +89,6 @@ def test_small_lengths_and_shares():
 
 def test_what_a_gap_depends_on():
     assert depends(Driver(covariate="reversal:x", share=0.9)) == "the reversals of x"
-    bump = StretchDriver(covariate="position:y", share=0.9, low=12.04, high=18.0, unit="mm")
-    assert depends(bump) == "where y stands, most of it from 12.0 to 18.0 mm of its travel"
 
 
 def test_ten_lines_at_most_and_no_cause_of_nothing():

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.diagnosis.report.run_view import RivalSignals, RunView, likeness, rms, spectrum
+from camcomp.diagnosis.report.run_view import RivalSignals, RunView, likeness, rms
 from camcomp.diagnosis.report.words import percent
-from camcomp.diagnosis.result.types import FoundCause, UnseenShrinkage, Where
+from camcomp.diagnosis.result.types import UnseenShrinkage, Where
 from camcomp.report.plot import (
     BAR_MARGIN,
     INK,
@@ -167,56 +167,6 @@ def figure_shares(where: Where) -> Figure | None:
         traces=[bars],
         layout={"xaxis": axis("share in %", range=[0, 115]), "yaxis": axis(""), "margin": BAR_MARGIN},
         height=120 + 26 * len(rows),
-    )
-
-
-def figure_spectrum(view: RunView) -> Figure | None:
-    """Amplitudes of the gap over frequency, before and after."""
-    curves, peaks = [], []
-    for i, (name, values) in enumerate(view.curves):
-        frequency, amplitude = spectrum(view.time, values)
-        if not len(frequency):
-            return None
-        index = thin(amplitude[:, None])
-        curves.append(line(name, numbers(frequency[index], 5), numbers(np.maximum(amplitude[index], 1e-4), 5), i))
-        top = int(amplitude.argmax())
-        peaks.append(f"{name} largest at {brief(frequency[top])} Hz with {brief(amplitude[top])} µm")
-    words = "; ".join(peaks)
-    return Figure(
-        name="spectrum",
-        title=f"By frequency, run {view.name}",
-        caption=f"Amplitude of the gap, all channels together: {words}.",
-        traces=curves,
-        layout={"xaxis": axis("frequency in Hz", type="log", dtick=1, exponentformat="power"),
-         "yaxis": axis("amplitude in µm", type="log", dtick=1, exponentformat="power")},
-    )  # fmt: skip
-
-
-def figure_causes(causes: Sequence[FoundCause]) -> Figure:
-    """Probability of every cause and its share of the gap."""
-    shown = causes[::-1]
-    names = [each.label for each in shown]
-    sizes = {"share of the gap": [c.share for c in shown], "probability": [c.probability for c in shown]}
-    bars = []
-    for i, (label, size) in enumerate(sizes.items()):
-        marker = {"color": STYLES[2 * (1 - i)][0], "pattern": {"shape": "" if i else "/"}}
-        bar = _bars([100.0 * each for each in size], names, [percent(each) for each in size])
-        bars.append(bar | {"name": label, "marker": marker, "showlegend": True})
-    words = ", ".join(f"{c.label} {100 * c.probability:.0f} %" for c in causes)
-    return Figure(
-        name="causes-plot",
-        title="Causes by probability",
-        caption="Probability that the cause is at work, given the library of effects, and its share of the gap's energy; "
-        f"probabilities: {words}.",
-        traces=bars,
-        layout={
-            "xaxis": axis("%", range=[0, 115]),
-            "yaxis": axis(""),
-            "margin": BAR_MARGIN,
-            "barmode": "group",
-            "legend": {"orientation": "h", "traceorder": "reversed", "x": 0, "y": 1.02, "yanchor": "bottom"},
-        },
-        height=150 + 60 * len(names),
     )
 
 

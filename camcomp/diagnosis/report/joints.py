@@ -1,16 +1,10 @@
-"""Error curves of joints with their bands and measured ranges, and the gap on withheld poses."""
+"""Error curves of joints with their bands and measured ranges."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-from camcomp.diagnosis.report.run_view import rms
 from camcomp.diagnosis.result.types import CurveCause, DiagnosisResult, ErrorCurve
-from camcomp.ground.datatypes import Floats
 from camcomp.report.page import Section, Table
 from camcomp.report.plot import STYLES, Figure, Json, axis, brief, line, numbers
 
@@ -20,8 +14,8 @@ TEXT = (
 )
 
 
-def joints_section(result: DiagnosisResult, residuals: Mapping[str, NDArray[Any]] | None = None) -> Section | None:
-    """Section with the curves of the joints, or None. residuals: rows of the poses, as `--residuals` writes them."""
+def joints_section(result: DiagnosisResult) -> Section | None:
+    """Section with the curves of the joints, or None."""
     causes = [each for each in result.causes if isinstance(each, CurveCause)]
     if not causes:
         return None
@@ -40,8 +34,6 @@ def joints_section(result: DiagnosisResult, residuals: Mapping[str, NDArray[Any]
         rows.append([str(c.target), f"{1e6 * size.value:.0f}", interval, seen, _intervals(c.curve)])
     table = Table("Curves of the joints", ("joint", "amplitude µrad", "95 %", "of a turn seen", "seen at deg"), rows)
     figures = [_curve(str(c.target), c.curve) for c in causes]
-    if residuals is not None and shrunk is not None and (spread := _spread(residuals, shrunk.holdout)) is not None:
-        figures.insert(0, spread)
     return Section(
         name="joints", title="Errors of the joints over their turn", text=text, figures=figures, tables=[table]
     )
@@ -78,30 +70,3 @@ def _curve(name: str, curve: ErrorCurve) -> Figure:
         layout={"xaxis": axis("angle in deg", range=[-180, 180], dtick=45), "yaxis": axis("error in µrad")},
         height=280,
     )
-
-
-def _spread(residuals: Mapping[str, NDArray[Any]], runs: Sequence[str]) -> Figure | None:
-    """Cumulative distribution of the gap on withheld poses, before and after."""
-    unseen = np.isin(residuals["run"], list(runs))
-    if not unseen.any() or unseen.all():  # without a run held out, all were fitted
-        return None
-    before, after = (_sizes(residuals, kind, unseen) for kind in ("gap", "rest"))
-    shares = np.linspace(0.0, 1.0, 101)
-    curves = [
-        line(name, numbers(np.quantile(size, shares), 2), numbers(100.0 * shares, 1), k)
-        for k, (name, size) in enumerate((("before", before), ("with the causes found", after)))
-    ]
-    words = f"rms {brief(rms(before))} µm before, {brief(rms(after))} µm with the causes found"
-    return Figure(
-        name="unseen-poses",
-        title=f"Unseen poses of {', '.join(runs)}: before and after",
-        caption=f"Share of the poses whose gap is smaller: {words}. None of them was used for the fit.",
-        traces=curves,
-        layout={"xaxis": axis("gap in µm", rangemode="tozero"), "yaxis": axis("% of the poses", range=[0, 100])},
-        height=300,
-    )
-
-
-def _sizes(residuals: Mapping[str, NDArray[Any]], kind: str, rows: NDArray[np.bool_]) -> Floats:
-    parts = [np.asarray(residuals[f"{kind}_{axis_name}_mm"], float)[rows] for axis_name in "xyz"]
-    return np.asarray(1e3 * np.linalg.norm(parts, axis=0), float)

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-from numpy.typing import NDArray
+from collections.abc import Sequence
 
 from camcomp.diagnosis.law.words import listed
 from camcomp.diagnosis.report.answer import by_share, floor_text, probability_text, verdict_text
 from camcomp.diagnosis.report.circles import circles_section
 from camcomp.diagnosis.report.figures import (
-    figure_causes,
     figure_ladder,
     figure_map,
     figure_rivals,
     figure_shares,
     figure_signed,
     figure_size,
-    figure_spectrum,
 )
 from camcomp.diagnosis.report.joints import joints_section
 from camcomp.diagnosis.report.law_section import LawView, law_section
@@ -58,13 +53,12 @@ def diagnosis_html(
     rivals: Sequence[RivalSignals] = (),
     next_program: Listing | None = None,
     law: LawView | None = None,
-    residuals: Mapping[str, NDArray[Any]] | None = None,
 ) -> bytes:
     """One HTML file. result: of any kind of study; views: runs to draw, withheld ones first.
 
     rivals: sets of causes that explain the logs equally well, the most probable first, with their signals in the runs of
     `views`. next_program: file of the proposed experiment. law: residuals explained by the law of an unknown effect.
-    residuals: rows of poses, as `--residuals` writes them. Raises ConfigError CC216 without the plot library.
+    Raises ConfigError CC216 without the plot library.
     """
     seen = [view for view in views if view.held_out] or list(views)
     seen = sorted(seen, key=lambda view: -rms(view.sizes[0]))
@@ -77,9 +71,9 @@ def diagnosis_html(
         None if result.law is None else law_section(result.law, law),
         _apart(result, rivals, views) if len(result.alternatives) > 1 else None,
         _shrinkage(result.shrinkage, floor) if result.shrinkage and result.shrinkage.steps else None,
-        joints_section(result, residuals),
+        joints_section(result),
         *_gap_of_runs(seen, floor),
-        _where(result.where, seen[:MOST_DRAWN]),
+        _where(result.where),
         standards_section(result.standards),
         inputs_section(inputs) if inputs else None,
     ]
@@ -146,7 +140,6 @@ def _causes(result: DiagnosisResult) -> Section:
     return Section(
         name="causes",
         title="Causes",
-        figures=[figure_causes(causes)],
         tables=[Table("Causes by probability", heads, rows)],
     )
 
@@ -211,8 +204,8 @@ def _next(proposal: NextExperiment) -> list[str]:
     return [f"Measure next: {proposal.action.rstrip('.')}.", f"{gain} {ADD_IT}"]
 
 
-def _where(where: Where, shown: Sequence[RunView]) -> Section:
-    figures = [figure for figure in (figure_shares(where), figure_spectrum(shown[0]) if shown else None) if figure]
+def _where(where: Where) -> Section:
+    figures = [figure for figure in (figure_shares(where),) if figure]
     tables = []
     if where.lines:
         lines: list[Row] = [
@@ -227,5 +220,11 @@ def _where(where: Where, shown: Sequence[RunView]) -> Section:
             [e.run, cell(e.t0_s), cell(e.t1_s), (e.share, f"{100 * e.share:.1f} %")] for e in where.intervals
         ]
         tables.append(Table("Times with most of the gap", ("run", "from s", "to s", "share"), intervals, sortable=True))
+    if where.frequencies:
+        shaken: list[Row] = [
+            [e.axis, cell(e.hertz), cell(e.amplitude_um), (e.share, f"{100 * e.share:.1f} %")]
+            for e in where.frequencies
+        ]
+        tables.append(Table("Vibrations", ("axis", "frequency Hz", "amplitude µm", "share"), shaken, sortable=True))
     text = [f"The gap arises in the stage: {where.stage}."]
     return Section(name="where", title="Where the gap is", text=text, figures=figures, tables=tables)

@@ -1,4 +1,4 @@
-"""Data of one run for the plots of a diagnosis report, and the spectrum of a gap."""
+"""Data of one run for the plots of a diagnosis report."""
 
 from __future__ import annotations
 
@@ -77,23 +77,3 @@ def likeness(one: RivalSignals, other: RivalSignals) -> float:
     a, b = a[known], b[known]
     size = float(np.linalg.norm(a) * np.linalg.norm(b))
     return float(abs(a @ b) / size) if size > 0.0 else 0.0
-
-
-def spectrum(time: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Frequencies (f,) Hz and amplitudes (f,) um of values (n, c), all channels together, by a Hann window.
-
-    Rows are interpolated linearly to an even grid first. Empty for fewer than 16 rows.
-    """
-    known = np.isfinite(values).all(axis=1) & np.isfinite(time)
-    t, v = time[known], values[known]
-    if len(t) < 16 or t[-1] <= t[0] or (np.diff(t) < 0).any():
-        return np.zeros(0), np.zeros(0)
-    step = float(np.median(np.diff(t)[np.diff(t) > 0])) if (np.diff(t) > 0).any() else 0.0
-    if step <= 0.0:
-        return np.zeros(0), np.zeros(0)
-    grid = np.arange(t[0], t[-1], step)
-    even = np.column_stack([np.interp(grid, t, v[:, c]) for c in range(v.shape[1])])
-    window = np.hanning(len(grid))[:, None]
-    amplitude = 2.0 * np.abs(np.fft.rfft((even - even.mean(axis=0)) * window, axis=0)) / window.sum()
-    size: Floats = np.linalg.norm(amplitude, axis=1)
-    return np.asarray(np.fft.rfftfreq(len(grid), step)[1:], float), size[1:]

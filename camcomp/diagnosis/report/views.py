@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.experiment.open_experiment import OpenExperiment
@@ -37,7 +36,6 @@ def report_of(
     result: DiagnosisResult,
     done: Diagnosis | None,
     opened: OpenExperiment | None,
-    residuals: Mapping[str, NDArray[Any]] | None = None,
     next_program: Listing | None = None,
 ) -> bytes:
     """The report of an experiment file. Without `done` (studies of logs that have no program) it has no plots of runs.
@@ -60,7 +58,6 @@ def report_of(
         result, views, title=PurePath(file.path).name, machine=file.config.robot.name, inputs=inputs,
         notes=opened.notes if opened is not None else (), rivals=rivals, next_program=next_program,
         law=_law_view(done.problem, done.law) if done is not None and done.law is not None else None,
-        residuals=residuals,
     )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import re
 from functools import cache
 from typing import Any
 
-from camcomp.diagnosis.result.types import Driver, Estimate, FoundCause, LawTerm, NamedCause, StretchDriver
+from camcomp.diagnosis.result.types import Driver, Estimate, FoundCause, LawTerm, NamedCause
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
@@ -113,9 +113,6 @@ def _told(value: float, ci95: tuple[float, float], unit: str, nominal: float | N
 
 
 def depends(driver: Driver) -> str:
-    """Text of a covariate of the gap, and the range in which the gap is largest."""
+    """Text of a covariate of the gap."""
     kind, _, name = driver.covariate.partition(":")
-    text = _COVARIATES.get(kind, driver.covariate).format(name or "the machine")
-    if isinstance(driver, StretchDriver):
-        text += f", most of it from {driver.low:.1f} to {driver.high:.1f} {driver.unit} of its travel"
-    return text
+    return _COVARIATES.get(kind, driver.covariate).format(name or "the machine")

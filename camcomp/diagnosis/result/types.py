@@ -94,14 +94,6 @@ class RippleDriver(Driver):
     backward_N: float
 
 
-class StretchDriver(Driver):
-    """A position as covariate of the gap, and the interval of travel with the largest gap."""
-
-    low: float
-    high: float
-    unit: Literal["mm", "rad"]
-
-
 class FrequencyLine(Result):
     """A line of the gap's spectrum over time."""
 
@@ -119,7 +111,7 @@ class Where(Result):
     actuators: dict[str, Share]
     lines: tuple[LineShare, ...] = ()
     intervals: tuple[IntervalShare, ...] = ()
-    drivers: tuple[RippleDriver | StretchDriver | Driver, ...] = ()
+    drivers: tuple[RippleDriver | Driver, ...] = ()
     frequencies: tuple[FrequencyLine, ...] = ()
 
 
