@@ -4,7 +4,7 @@ Reads like the question: put the runs on the bench, open the problem, search_cau
 answer on runs it has not seen.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
-from camcomp.diagnosis.fit.gap import floor_um, gap_sizes, main_channels, rest_by_actuator
+from camcomp.diagnosis.fit.gap import floor_um, gap_sizes, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
 from camcomp.diagnosis.fit.open_problem import open_problem
@@ -30,7 +30,7 @@ from camcomp.diagnosis.next_experiment.designed import explore, propose
 from camcomp.diagnosis.next_experiment.proposal import ONLY_NOISE, Proposal, with_outcomes
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import (
-    UNKNOWN,
+    SOMETHING_UNKNOWN,
     DiagnosisResult,
     Driver,
     Estimate,
@@ -41,7 +41,6 @@ from camcomp.diagnosis.result.types import (
     NextExperiment,
     Outlier,
     UnknownCause,
-    UnseenShrinkage,
     Where,
 )
 from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
@@ -62,14 +61,21 @@ ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begu
 UNLOGGED_RISE = (0.3, 3.0)  # times the 10 K that are taken where no temperature is logged: by how much drives warm up
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Diagnosis:
-    """The result, and the fitted problem, search, proposal and law that a report draws."""
+    """The result, and what a report draws: the fitted problem, search, proposal and law.
+
+    causes: as the result has them. judged: the runs of the shrinkage; chosen: per such run the causes by candidate that were
+    chosen and fitted without it.
+    """
 
     result: DiagnosisResult
     problem: Problem
     search: CauseSearch
     proposal: Proposal | None
+    causes: list[Cause]
+    judged: Bench
+    chosen: Sequence[Mapping[int, Cause]]
     law: LawAnswer | None = None
 
 
@@ -101,10 +107,13 @@ def diagnose(
     stands = problem
     if law is not None:  # causes have the values that they have beside it; those that had only followed it are gone
         stands, best = law.problem, law.fit
-    shrinkage = _shrinkage(
-        twin=twin, runs=runs, holdout=holdout, problem=stands, best=best, found=found if law is None else None
-    )
-    unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
+    answer = stands.causes(best.members, best.theta, best.extra)
+    if withheld := [run for run in runs if run not in used]:
+        judged, chosen = Bench(twin=twin, runs=withheld), [dict(zip(best.members, answer, strict=True))] * len(withheld)
+    else:  # every run is held out once, from the choice among the sets that were found, too, where the problem is still theirs
+        judged, fits = stands.bench, found.sets.fits if law is None else ()
+        chosen = causes_without(stands, best, fits, found.sets.probability[: len(fits)])
+    unseen = bool(withheld) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
     proposed = None if proposal is None else NextExperiment(
         action=proposal.candidate.action, separates=tuple(proposal.separates), gain=round(proposal.gain, 4),
@@ -118,19 +127,16 @@ def diagnose(
         verdict=word, gap=gap, where=_where(problem, found, best, law),
         causes=_causes(stands, found, best, law),
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
-        shrinkage=shrinkage if unseen else None,
+        shrinkage=shrinkage_of(stands, best, judged, chosen) if unseen else None,
         next_experiment=proposed, minor=minor_effects(stands, best),
         outliers=outliers, floor=Floor(um=gap.noise_floor_um, source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(problem)),
         standards=of_runs(twin, runs),
     ))  # fmt: skip
     return Diagnosis(
-        result,
-        problem,
-        found,
-        None if result.next_experiment is None else proposal,
-        None if result.law is None else law,
-    )
+        result=result, problem=problem, search=found, proposal=None if result.next_experiment is None else proposal,
+        causes=answer, judged=judged, chosen=chosen, law=None if result.law is None else law,
+    )  # fmt: skip
 
 
 def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal | None:
@@ -267,7 +273,7 @@ def _alternatives(problem: Problem, found: CauseSearch) -> tuple[tuple[NamedCaus
     rivals = found.sets.rivals
     fits = [found.sets.fits[j] for j in (found.sets.first, *rivals[: MOST_SETS - 1])]
     named = tuple(tuple(_named(problem, i) for i in f.members) for f in fits)
-    return named if rivals else (*named, (NamedCause(effect=UNKNOWN, target=None),))
+    return named if rivals else (*named, (SOMETHING_UNKNOWN,))
 
 
 def _named(problem: Problem, i: int) -> NamedCause:
@@ -332,27 +338,3 @@ def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[SpectralLine]
         at_null = residual_tests(problem, null, firm_prior(problem))
         labels = next(iter(at_null.values()), ())
     return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:MOST_LISTED] if share > MINOR**2]
-
-
-# -- shrinkage --------------------------------------------------------------------------------------------------------
-
-
-def _shrinkage(
-    twin: Twin, runs: Sequence[Run], holdout: Sequence[str], problem: Problem, best: Fitted, found: CauseSearch | None
-) -> UnseenShrinkage:
-    """Named runs are judged with the answer of the others; without names every run is held out once, from the choice among the
-    sets that were found, too, where the problem is still theirs.
-    """
-    if holdout:
-        seen = Bench(twin=twin, runs=[run for run in runs if run.name in holdout])
-        causes = problem.causes(best.members, best.theta, best.extra)
-        chosen = [dict(zip(best.members, causes, strict=True))] * len(seen.runs)
-    else:
-        seen = problem.bench
-        rivals = () if found is None else found.sets.fits
-        chosen = causes_without(problem, best, rivals, np.zeros(0) if found is None else found.sets.probability)
-    floor = round(floor_um(problem), 3)
-    return shrinkage_of(
-        problem, best, seen=seen, chosen=chosen, order=list(np.argsort([-e for e in _energies(problem, best)])),
-        part=main_channels(problem), floor_um=floor,
-    )  # fmt: skip

@@ -17,7 +17,7 @@ from camcomp.diagnosis.arm.poses import ArmBench
 from camcomp.diagnosis.arm.unseen import acting
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.experiment.open_experiment import columns_of
-from camcomp.diagnosis.fit.bench import Bench, Run, thinned
+from camcomp.diagnosis.fit.bench import Run, thinned
 from camcomp.diagnosis.result.types import DiagnosisResult
 from camcomp.ground.datatypes import Floats
 from camcomp.model.motion.log_columns import DYNO, LINE, TIME, TIP, log_columns
@@ -32,15 +32,9 @@ Columns = dict[str, NDArray[Any]]
 
 def of_runs(done: Diagnosis, twin: Twin, runs: Sequence[Run]) -> Columns:
     """Runs of programs in their order, those held out too: the causes are those fitted to the others."""
-    problem, names = done.problem, columns_of(twin)
-    best = done.search.sets.best
-    causes = problem.causes(best.members, best.theta, best.extra) if done.result.known else []
+    names, causes = columns_of(twin), done.causes if done.result.known else []
     channels = (*TIP, *names.encoder, *names.drive, *DYNO)
-    seen = {run.name: (problem.bench, k) for k, run in enumerate(problem.bench.runs)}
-    unseen = [run for run in runs if run.name not in seen]
-    if unseen:
-        bench = Bench(twin=twin, runs=unseen)
-        seen |= {run.name: (bench, k) for k, run in enumerate(unseen)}
+    seen = {run.name: (bench, k) for bench in (done.problem.bench, done.judged) for k, run in enumerate(bench.runs)}
     parts = list[Columns]()
     for run in runs:
         bench, k = seen[run.name]

@@ -8,7 +8,7 @@ from camcomp.diagnosis.answer.unseen import JudgedRun, unseen_shrinkage
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run
 from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.columns import candidate_columns
-from camcomp.diagnosis.fit.gap import square_lengths
+from camcomp.diagnosis.fit.gap import floor_um, main_channels, square_lengths
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.result.types import UnseenShrinkage
@@ -17,21 +17,14 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 
 
-def shrinkage_of(
-    problem: Problem,
-    best: Fitted,
-    *,
-    seen: Bench,
-    chosen: Sequence[Mapping[int, Cause]],
-    order: Sequence[int],
-    part: slice,
-    floor_um: float,
-) -> UnseenShrinkage:
-    """The `shrinkage` of the result. seen: the held-out runs; chosen: per run the causes by candidate, chosen and fitted without
-    it; order: of the members; part: the channels of the gap.
+def shrinkage_of(problem: Problem, best: Fitted, seen: Bench, chosen: Sequence[Mapping[int, Cause]]) -> UnseenShrinkage:
+    """The `shrinkage` of the result by the members of a fit, the largest one first.
+
+    seen: the held-out runs; chosen: per run the causes by candidate, chosen and fitted without it.
     """
+    part = main_channels(problem)
     free, named = _nuisances(seen, problem.bench.runs, part)
-    members = [best.members[j] for j in order]
+    members = sorted(best.members, key=lambda i: -problem.moved_um(best, (i,)))
 
     def squares(count: int) -> list[Floats]:
         """With so many members of the answer, as far as they were chosen; with all of them, all that was."""
@@ -44,7 +37,7 @@ def shrinkage_of(
     candidates = [problem.columns.candidates[i] for i in members]
     return unseen_shrinkage(
         [JudgedRun(each) for each in zip(*per_step, strict=True)], [(c.name, c.target) for c in candidates],
-        holdout=tuple(run.name for run in seen.runs), noise_floor_um=round(floor_um, 3), refitted=tuple(named),
+        holdout=tuple(run.name for run in seen.runs), noise_floor_um=round(floor_um(problem), 3), refitted=tuple(named),
     )  # fmt: skip
 
 

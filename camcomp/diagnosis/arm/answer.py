@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import ranksums as rank_sums
 
 from camcomp.diagnosis.answer.minor import MOST_LISTED
 from camcomp.diagnosis.arm.case import PoseCase
@@ -20,7 +20,6 @@ from camcomp.diagnosis.model.folds import REGIONS, without_nuisances
 from camcomp.diagnosis.model.noise import HEALTHY, LEAST_VALUES, MINOR
 from camcomp.diagnosis.model.verdict import decide
 from camcomp.diagnosis.result.types import (
-    UNKNOWN,
     Driver,
     Estimate,
     FoundCause,
@@ -29,8 +28,9 @@ from camcomp.diagnosis.result.types import (
     NamedCause,
     UnknownCause,
     Where,
+    alternatives_of,
 )
-from camcomp.diagnosis.statistics.places import FALSE
+from camcomp.diagnosis.statistics.places import FALSE, shares
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
 from camcomp.ground.datatypes import Floats
 
@@ -121,13 +121,10 @@ def with_unknown(case: PoseCase, named: tuple[FoundCause, ...], word: str) -> tu
 
 
 def alternatives(case: PoseCase, named: Sequence[FoundCause]) -> tuple[tuple[NamedCause, ...], ...]:
-    """Sets that are indistinguishable by the poses, the best first; a lone set gets itself plus an unknown effect as
-    its rival.
-    """
-    known = tuple(NamedCause(effect=c.effect, target=c.target) for c in named if not isinstance(c, UnknownCause))
+    """Sets that are indistinguishable by the poses, the best first."""
+    known = [c.named for c in named if not isinstance(c, UnknownCause)]
     others = [tuple(NamedCause(effect=e, target=t) for e, t in case.places(m)) for m in case.alternatives()[1:]]
-    others = [each for each in others if each and known]
-    return (known, *(others or [(*known, NamedCause(effect=UNKNOWN, target=None))]))
+    return alternatives_of(known, [each for each in others if each and known])
 
 
 # -- where ------------------------------------------------------------------------------------------------------------
@@ -143,14 +140,12 @@ def where(case: PoseCase, word: str) -> Where:
         stages[stage] = stages.get(stage, 0.0) + size
         if part.target is not None:
             actuators[part.target] += size
-    total = max(sum(actuators.values()), 1e-300)
     most: Any = max(stages, key=lambda s: stages[s]) if stages else "structure"
-    whole = max(float(energy.sum()), 1e-300)
     intervals = _intervals(case) if word == "unknown" else ()
     return Where(
         stage=most,
-        axes={axis: round(float(e) / whole, 4) for axis, e in zip("xyz", energy, strict=True)},
-        actuators={name: round(size / total, 4) for name, size in actuators.items()},
+        axes=shares(dict(zip("xyz", energy.tolist(), strict=True))),
+        actuators=shares(actuators),
         drivers=drivers(case, intervals) if word == "unknown" else (),
         intervals=intervals,
     )
@@ -198,41 +193,24 @@ def _energy_beside(case: PoseCase, background: Background) -> float:
     return _energy([(g.y - model.layout.design(g) @ at.mean) / g.sd for g in groups])
 
 
-def windows(time: Floats) -> list[np.ndarray]:
-    """Indices of at most REGIONS stretches of time of LEAST_VALUES poses or more."""
-    count = min(REGIONS, len(time) // LEAST_VALUES)
-    return list(np.array_split(np.argsort(time, kind="stable"), count)) if count > 1 else []
-
-
-def standing_out(size: Floats, groups: Sequence[np.ndarray]) -> list[int]:
-    """Groups of indices whose sizes (n,) are larger than those of the others: rank sums, 1 % over all groups.
-
-    Source: Mann, Whitney, Ann. Math. Stat. 18 (1947) 50.
-    """
-    rank = np.empty(len(size))
-    rank[np.argsort(size, kind="stable")] = np.arange(1, len(size) + 1)
-    out = []
-    for i, own in enumerate(groups):
-        n, m = len(own), len(size) - len(own)
-        if not n or not m:
-            continue
-        z = (rank[own].sum() - n * (n + m + 1) / 2.0) / np.sqrt(n * m * (n + m + 1) / 12.0)
-        if norm.sf(z) < FALSE / len(groups):
-            out.append(i)
-    return out
-
-
 def _intervals(case: PoseCase) -> tuple[IntervalShare, ...]:
-    """Stretches of a run's time in which the residual is larger than elsewhere."""
+    """Stretches of a run's time in which the residual is larger than elsewhere: rank sums, 1 % over all of a run.
+
+    A run has at most REGIONS stretches of LEAST_VALUES poses or more. Source: Mann, Whitney, Ann. Math. Stat. 18 (1947) 50.
+    """
     whole = max(_energy(case.rest), 1e-300)
     out = []
     for k, rest in zip(case.bench.own, case.rest, strict=True):
         poses, square = case.bench.campaigns[k], (rest**2).sum(axis=1)
         for run in dict.fromkeys(str(name) for name in poses.run) if poses.has_clock else ():
             rows = np.flatnonzero(poses.run == run)
-            own = windows(poses.time[rows])
-            for i in standing_out(square[rows], own):
-                time, energy = poses.time[rows][own[i]], float(square[rows][own[i]].sum())
+            rows = rows[np.argsort(poses.time[rows], kind="stable")]
+            count = min(REGIONS, len(rows) // LEAST_VALUES)
+            for own in np.array_split(rows, count) if count > 1 else ():
+                chance = rank_sums(square[own], square[np.setdiff1d(rows, own)], alternative="greater").pvalue
+                if chance >= FALSE / count:
+                    continue
+                time, energy = poses.time[own], float(square[own].sum())
                 out.append(
                     IntervalShare(
                         run=run, t0_s=float(time.min()), t1_s=float(time.max()), share=round(energy / whole, 4)

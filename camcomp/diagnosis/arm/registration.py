@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from camcomp.ground.datatypes import Floats
 
@@ -33,8 +34,7 @@ class Registration:
 
     def moved(self, step: Floats, about: Floats) -> Registration:
         """After a step (9,): turn rad and shift mm of the machine about a point (3,), machine axes, and of the tool."""
-        turn = _turn(step[:3])
-        rotation = self.rotation @ turn
+        rotation = self.rotation @ Rotation.from_rotvec(step[:3]).as_matrix()
         return Registration(
             rotation, self.origin + self.rotation @ (step[3:6] + about) - rotation @ about, self.tool + step[6:]
         )
@@ -74,13 +74,3 @@ def nuisance_columns(tips: Floats, pose: Floats, about: Floats) -> Floats:
     for i in range(3):
         turn[:, :, i] = np.cross(np.eye(3)[i], lever)
     return np.concatenate([turn, np.broadcast_to(np.eye(3), turn.shape), pose], axis=2)
-
-
-def _turn(w: Floats) -> Floats:
-    angle = float(np.linalg.norm(w))
-    W = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
-    if angle < 1e-12:
-        small: Floats = np.eye(3) + W
-        return small
-    out: Floats = np.eye(3) + np.sin(angle) / angle * W + (1.0 - np.cos(angle)) / angle**2 * (W @ W)
-    return out

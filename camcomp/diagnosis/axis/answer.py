@@ -26,6 +26,7 @@ from camcomp.diagnosis.result.types import (
     UnseenShrinkage,
     Where,
 )
+from camcomp.diagnosis.statistics.places import shares
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 from camcomp.model.motion.log_columns import log_columns
@@ -87,8 +88,7 @@ def _rms(values: Floats) -> float:
 def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
     """Shares of axes; covariates of the residuals, and the intervals in which they exceed the floor."""
     known = [c for c in causes if not isinstance(c, UnknownCause)]
-    energy = {a.name: c.squares[0] for a in found if (c := a.following or a.force) is not None}
-    total = max(sum(energy.values()), 1e-300)
+    share = shares({a.name: c.squares[0] for a in found if (c := a.following or a.force) is not None})
     drivers: list[Driver] = []
     for a in found:
         if a.ripple and a.revolute:
@@ -111,8 +111,8 @@ def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
     lag = any(c.effect in ("servo_lag", "speed_limit") for c in known)
     return Where(
         stage="control" if lag or not known else "drive",
-        axes={axis: round(energy.get(axis, 0.0) / total, 4) for axis in "xyz"},
-        actuators={name: round(e / total, 4) for name, e in energy.items()},
+        axes={axis: share.get(axis, 0.0) for axis in "xyz"},
+        actuators=share,
         drivers=tuple(sorted(drivers, key=lambda d: -d.share)),
         intervals=_intervals(found),
     )

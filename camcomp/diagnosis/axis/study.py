@@ -30,13 +30,7 @@ from camcomp.diagnosis.model.noise import REPEATABILITY_MM, StatedDeviation
 from camcomp.diagnosis.model.verdict import Word, decide
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.standards import StandardValues
-from camcomp.diagnosis.result.types import (
-    UNKNOWN,
-    DiagnosisResult,
-    Floor,
-    NamedCause,
-    Outlier,
-)
+from camcomp.diagnosis.result.types import DiagnosisResult, Floor, Outlier, alternatives_of
 from camcomp.ground import progress
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.description import Robot
@@ -88,14 +82,14 @@ def _result(
     whole = sum(len(a.channels) for a in found)  # every channel weighs alike
     causes = [c.model_copy(update={"share": round(c.share / whole, 4)}) for a in found for c in a.causes]
     causes.sort(key=lambda c: (-c.probability, -c.share))
-    known = tuple(NamedCause(effect=c.effect, target=c.target) for c in causes)
+    known = [c.named for c in causes]
     verdict = _verdict(found)
     if verdict == "unknown" or (verdict == "ambiguous" and not causes):
         causes += [answer.unknown(a, whole) for a in found if a.strange or verdict == "ambiguous"]
     gap, every = answer.gap(found, tip), [c for a in found for c in a.channels]
     result = DiagnosisResult(
         verdict=verdict, gap=gap, where=answer.where(found, causes), causes=tuple(causes),
-        alternatives=(known, (*known, NamedCause(effect=UNKNOWN, target=None))) if verdict == "ambiguous" else (),
+        alternatives=alternatives_of(known) if verdict == "ambiguous" else (),
         shrinkage=answer.shrinkage(judged, held, tip) if judged else None,
         next_experiment=next_moves(found, tip.axes, verdict),
         floor=Floor(um=gap.noise_floor_um, source="stated" if all(c.stated for c in every) else "rows"),

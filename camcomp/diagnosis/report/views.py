@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.experiment.open_experiment import OpenExperiment
-from camcomp.diagnosis.fit.bench import Bench, Run, thinned
+from camcomp.diagnosis.fit.bench import Bench, thinned
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.problem import Problem
@@ -23,7 +22,6 @@ from camcomp.diagnosis.result.types import DiagnosisResult, NamedCause
 from camcomp.ground.files import read_bytes
 from camcomp.model.config.load import ExperimentFile
 from camcomp.model.effect import Cause
-from camcomp.model.motion.twin import Twin
 from camcomp.report.inputs import Input
 from camcomp.report.page import Listing
 
@@ -52,7 +50,7 @@ def report_of(
     views: list[RunView] = []
     rivals: list[RivalSignals] = []
     if done is not None and opened is not None:
-        views = views_of(done, opened.twin, opened.runs, experiment.holdout)
+        views = views_of(done)
         rivals = rivals_of(done)
     return diagnosis_html(
         result, views, title=PurePath(file.path).name, machine=file.config.robot.name, inputs=inputs,
@@ -61,25 +59,16 @@ def report_of(
     )  # fmt: skip
 
 
-def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence[str]) -> list[RunView]:
-    """Runs of the fit in their order, then those named in `holdout`.
-
-    Without a holdout every run is shown with causes chosen and fitted without it.
-    """
-    problem, count = done.problem, len(done.problem.bench.runs)
-    best = done.search.sets.best
-    answer = problem.causes(best.members, best.theta, best.extra)
-    chosen = [answer] * count
-    if not holdout:
-        without = causes_without(problem, best, done.search.sets.fits, done.search.sets.probability)
-        chosen = [list(each.values()) for each in without]
-    each_one = not holdout and count > 1
-    out = [_view(problem, problem.bench, k, causes, held_out=each_one) for k, causes in enumerate(chosen)]
-    unseen = [run for run in runs if run.name in holdout and run.name not in {each.name for each in problem.bench.runs}]
-    if unseen:
-        bench = Bench(twin=twin, runs=unseen)
-        out += [_view(problem, bench, k, answer, held_out=True) for k in range(len(unseen))]
-    return out
+def views_of(done: Diagnosis) -> list[RunView]:
+    """Runs that were withheld, behind those of the fit; else every run with causes chosen and fitted without it."""
+    problem, unseen = done.problem, done.result.shrinkage is not None
+    judged = [
+        _view(problem, done.judged, k, list(each.values()), held_out=unseen) for k, each in enumerate(done.chosen)
+    ]
+    if done.judged is problem.bench:
+        return judged
+    fitted = range(len(problem.bench.runs))
+    return [*(_view(problem, problem.bench, k, done.causes, held_out=False) for k in fitted), *judged]
 
 
 def rivals_of(done: Diagnosis) -> list[RivalSignals]:

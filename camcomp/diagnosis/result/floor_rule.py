@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from camcomp.diagnosis.model.verdict import SURE
-from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, NamedCause, UnknownCause, UnseenShrinkage
+from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, UnknownCause, UnseenShrinkage, alternatives_of
 from camcomp.diagnosis.statistics.probability import EVEN
 
 
@@ -46,11 +46,11 @@ def _unchanged(unseen: UnseenShrinkage) -> UnseenShrinkage:
 
 def _without_unknown(result: DiagnosisResult) -> DiagnosisResult:
     """Known causes alone; without any, `ambiguous` between nothing and something unmodelled."""
-    known, named = result.known, tuple(NamedCause(effect=c.effect, target=c.target) for c in result.known)
+    known = result.known
     if known and all(c.probability >= SURE for c in known) and not result.alternatives:
         return result.model_copy(update={"verdict": "identified", "causes": known})
     rest = tuple(
         c.model_copy(update={"probability": EVEN, "law": None}) for c in result.causes if isinstance(c, UnknownCause)
     )
-    alternatives = result.alternatives or (named, (*named, NamedCause(effect=UNKNOWN, target=None)))
+    alternatives = result.alternatives or alternatives_of([c.named for c in known])
     return result.model_copy(update={"verdict": "ambiguous", "causes": known or rest, "alternatives": alternatives})

@@ -5,6 +5,7 @@ All keys are always present; those that do not apply to a study are empty or nul
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -127,6 +128,16 @@ class NamedCause(Result):
         return f"{self.effect} ({self.target})" if self.target else self.effect
 
 
+SOMETHING_UNKNOWN = NamedCause(effect=UNKNOWN, target=None)
+
+
+def alternatives_of(
+    known: Sequence[NamedCause], others: Sequence[tuple[NamedCause, ...]] = ()
+) -> tuple[tuple[NamedCause, ...], ...]:
+    """Sets that explain alike, the best one first; a lone set has itself plus something unknown as its rival."""
+    return (tuple(known), *(others or [(*known, SOMETHING_UNKNOWN)]))
+
+
 class Estimate(Result):
     """A value with its 95 % interval."""
 
@@ -146,6 +157,11 @@ class FoundCause(NamedCause):
     probability: Annotated[float, Field(ge=0.0, le=1.0)]
     share: Share
     parameters: dict[str, Estimate] = Field(default_factory=dict)
+
+    @property
+    def named(self) -> NamedCause:
+        """Its effect and target."""
+        return NamedCause(effect=self.effect, target=self.target)
 
     @property
     def settings(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc
+from scipy.stats import false_discovery_control
 
 from camcomp.ground.datatypes import Floats, Ints
 
@@ -67,21 +68,9 @@ def _chance(part: Part) -> float:
     return float(chdtrc(max(count, 1.0), sum(np.nansum(z**2) / thin for z, thin in normal)))
 
 
-def discoveries(chances: Sequence[float]) -> list[bool]:
-    """Benjamini-Hochberg."""
-    order = np.argsort(chances)
-    n = len(order)
-    passed = [i for i, k in enumerate(order) if chances[k] <= FALSE * (i + 1) / n]
-    last = max(passed) if passed else -1
-    out = [False] * n
-    for i in order[: last + 1]:
-        out[int(i)] = True
-    return out
-
-
 def _standing_out(parts: Sequence[Labelled]) -> list[Labelled]:
     """The parts that stand out of the noise."""
-    real = discoveries([_chance(part) for _, part in parts])
+    real = false_discovery_control([_chance(part) for _, part in parts]) <= FALSE
     return [each for each, ok in zip(parts, real, strict=True) if ok]
 
 
