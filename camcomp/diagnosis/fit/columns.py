@@ -140,39 +140,22 @@ def build(
     Every healthy machine has a little of everything: what moves the tip by HEALTHY of the noise floor is within tolerance,
     whatever other channels see of it.
     """
-    owner: list[int] = []
-    names: list[str] = []
-    tolerance: list[float] = []
-    sign: list[float] = []
-    unit: list[float] = []
-    parts: list[list[Floats]] = []
-
-    def put(who: int, name: str, size: float, per_run: list[Floats], *, signed: int = 0, of_floor: float = 1.0) -> None:
-        owner.append(who)
-        names.append(name)
-        tolerance.append(size)
-        sign.append(float(signed))
-        unit.append(of_floor)
-        parts.append(per_run)
-
+    found = list[tuple[int, str, float, float, int, list[Floats]]]()
     for i, candidate in enumerate(steps(candidates, len(candidates))):
-        for p, per_run in zip(
-            candidate.parameters,
-            candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
-            strict=True,
-        ):
+        own = candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate)))
+        for p, per_run in zip(candidate.parameters, own, strict=True):
             size, of_floor = healthy_size(bench, candidate, p, per_run, floor_um)
-            put(i, f"{candidate.label}.{p.name}", size, per_run, signed=p.sign, of_floor=of_floor)
-    for name, size, per_run in _nuisances(bench):
-        put(-1, name, size, per_run)
+            found.append((i, f"{candidate.label}.{p.name}", size, of_floor, p.sign, per_run))
+    found += [(-1, name, size, 1.0, 0, per_run) for name, size, per_run in _nuisances(bench)]
+    owner, names, tolerance, unit, sign, parts = zip(*found, strict=True)
     channels = range(6 + 2 * len(bench.actuators))
     blocks = tuple(
         ByChannel.of(np.stack([each[r][:, c] for each in parts], axis=1) for c in channels)
         for r in range(len(bench.runs))
     )
     bench.columns.clear()  # they stand in the blocks now
-    prior = Prior(np.array(tolerance), np.array(sign), np.array(unit))
-    return Columns(tuple(candidates), np.array(owner), tuple(names), prior, blocks)
+    prior = Prior(np.array(tolerance), np.array(sign, float), np.array(unit))
+    return Columns(tuple(candidates), np.array(owner), names, prior, blocks)
 
 
 def healthy_size(

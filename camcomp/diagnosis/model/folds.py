@@ -24,11 +24,10 @@ REGIONS = 16  # of positions or time, between which squares are compared
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Residuals of a fold: rows of the model's group g; near (n, c) in channel units; squares (n,) of values of size 1."""
+    """Residuals (n, c) of a fold in channel units: rows of the model's group g; squares (n,) of values of size 1."""
 
     group: int
     left: Floats
-    near: Floats
     squares: Floats
 
 
@@ -81,7 +80,7 @@ def held_out(
         squares = product.sum(axis=1) * values / max(values - free, 1)
         if alone:
             left = without_nuisances(left, group.N)
-        out.append(HeldOut(g, left, near, squares))
+        out.append(HeldOut(g, left, squares))
     return out
 
 
