@@ -50,7 +50,7 @@ EVEN = 1.1127756842787055 ** -np.arange(1.0, 7.0)  # multiples fill the cube eve
 NARROW = 6.0  # a force component so many times smaller than the largest needs a degree less in position
 WIDER = 1.25  # limits of the force range are powers of it, so that programs with about the same forces share cubes
 NO_FORCE_N = 1e-9
-SLICE = 4096  # rows that a thread takes at once
+SLICE = 1 << 14  # rows that a thread takes at once
 _ZERO = np.zeros(3)
 
 

@@ -30,7 +30,7 @@ from camcomp.model.config.spec import Config
 from camcomp.model.control import waiting_s
 
 CHUNK_BYTES = 1 << 21  # bytes read at once
-RUN = 1 << 14  # motions of a linear run at most
+RUN = 1 << 15  # motions of a linear run at most
 PROBE_MOTIONS = 48  # linear motions in a row that make a run of their own
 _PROGRAM = re.compile(rb"(?:^|[\r\n])[ \t]*[O:][ \t]*\d", re.IGNORECASE)
 _END = re.compile(END_OF_LINE.encode())

@@ -111,21 +111,23 @@ def without_shared_ends(track: Track, piece: Ints, w: Floats) -> tuple[Ints, Flo
 
 
 def travel_of(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
-    """Force and time of points in the order of travel. Rapids go at RAPID_FEED where the time matters."""
+    """Force of points in the order of travel; their time, with rapids at RAPID_FEED, where effects depend on it, else zero."""
+    force, turn, rotation = job.frame.vectors(track.force(piece, w)), track.path.orientation, None
+    if turn is not None:
+        rotation = platform_rotations(job, turn.form, turn.words(track.motion[piece], track.u(piece, w)))
+    if not job.causes:
+        none = np.zeros(len(piece))
+        return Travel(force=force, time=none, cut_min=none, stop=none > 0.0, rotation=rotation)
     minutes = track.length / _speeds(job, track.path)[track.motion]
     start = track.began_min + np.cumsum(minutes) - minutes
     cut = minutes * track.cutting
     worn = np.cumsum(cut) - cut
-    force = job.frame.vectors(track.force(piece, w))
     behind = np.concatenate((track.corner[1:], [True]))
     stop = (w == 0.0) & track.corner[piece] | (w == 1.0) & behind[piece]
     time = 60.0 * (start[piece] + w * minutes[piece])
     around = None
-    if job.causes and has_moved_mass(job.real_machine.robot):
+    if has_moved_mass(job.real_machine.robot):
         around = _around(track, 60.0 * minutes, piece, time)
-    turn, rotation = track.path.orientation, None
-    if turn is not None:
-        rotation = platform_rotations(job, turn.form, turn.words(track.motion[piece], track.u(piece, w)))
     return Travel(
         force=force, time=time, cut_min=worn[piece] + w * cut[piece], stop=stop, around=around, rotation=rotation
     )
