@@ -8,10 +8,9 @@ import numpy as np
 
 from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import BASIC, follow, same_points
-from camcomp.compensation.long.proof import MOST_CHECKED, judge
 from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.compensation.program.compensate import Compensated, compensate
-from camcomp.compensation.program.result import Interpolation
+from camcomp.compensation.program.result import BOUND_UM, Interpolation
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.records import dataclass, fields, replace
@@ -23,6 +22,7 @@ from camcomp.model.statics.target import Correction, correct
 
 MOST_STEPS, STEP_MM = 20, 1e-5  # the slopes of a cube are those of its centre: every step leaves a tenth
 LEAST_MOTIONS = 2000  # from which new cubes pay
+MOST_CHECKED = 1000  # points that are solved exactly as a proof
 COARSE_MM = 1e-3  # from a command: farther ones are not taken for its first order
 
 
@@ -155,9 +155,10 @@ class InterpolatedMachine:
     def proof(self, target: Floats, force: Floats) -> tuple[Interpolation | None, int]:
         """Differences of a sample of targets (n, 3) under forces (n, 3) to their exact solutions, and the most iterations.
 
-        None and 0: nothing was asked.
+        None and 0: nothing was asked. Keeps the tiles if they are good enough.
         """
-        if self._field is None:
+        known = self._field
+        if known is None or not len(target):
             return None, 0
         chosen = np.sort(
             np.random.default_rng(len(target)).permutation(len(target))[:MOST_CHECKED]
@@ -166,8 +167,15 @@ class InterpolatedMachine:
         aimed, exact = self.solve(TARGET, p, f, None), correct(self.machine, p, f)
         told = np.where(exact.status[:, None] == 0, exact.commanded, p)
         free = self.solve(FREE, told, f, None)  # which has to lead back to the targets
-        gaps, drive = (aimed.commanded - exact.commanded, free.tip - p), free.drive - exact.drive
-        found = judge(self._field, gaps, aimed.rho - exact.rho, drive, len(p) + self._exact)
+        gaps = (aimed.commanded - exact.commanded, free.tip - p, (aimed.rho - exact.rho) * known.reach)
+        worst = max(1e3 * float(np.abs(each).max()) for each in gaps)
+        known.keep(sound=worst <= BOUND_UM)
+        found = Interpolation(
+            bound_um=BOUND_UM, checked=len(p), worst_um=worst if np.isfinite(worst) else float("inf"),
+            worst_drive_force=float(np.nan_to_num(np.abs(free.drive - exact.drive), nan=np.inf).max()),
+            tiles=int(known.used.sum()),
+            exact_solutions=int(known.tiles.solved[known.used].sum()) + len(p) + self._exact,
+        )  # fmt: skip
         return found, int(exact.iterations.max(initial=0))
 
 

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
-from camcomp.compensation.long.answers import with_answers
+from camcomp.compensation.long.answers import MOST_CHECKED, with_answers
 from camcomp.compensation.long.linear_run import LinearRun, NotInPieces
-from camcomp.compensation.long.proof import Sample
 from camcomp.compensation.long.runs import InterpretedRun, Runs
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.moves import minutes_of
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
     from camcomp.compensation.long.followed_runs import FollowedRuns
 
 HASHED = 1 << 22  # bytes at once
-LINE_OF_STAMP = 256  # bytes
+LINE_OF_STAMP, LINE_BYTES = 256, 24.0  # bytes; of a stamp at most, of a line of a program about
 NEAR = 1e-3  # mm: only the direction of a neighbour matters, and on which side of the stock's top it is
 
 
@@ -82,7 +81,11 @@ class LongProgram:
             raise NotInPieces
         self._interpolated = with_answers(self.job)
         self._minutes = 0.0  # of the pieces so far
-        self._sample = Sample(digest.hexdigest(), size)
+        self._random = np.random.default_rng(
+            int(digest.hexdigest()[:16], 16)
+        )  # the program decides which rows are proved
+        self._share = min(1.0, 3.0 * MOST_CHECKED * LINE_BYTES / max(size, 1))
+        self._sample = [np.zeros((0, 6))]  # target (3) mm and force (3) N of corrected rows, machine frame
         self._lines = max(lines, 1)
         self.totals.lines_in = lines
         self._stock = _stock_of(self.job, source, self.name, self.setup)
@@ -100,7 +103,8 @@ class LongProgram:
             self._stock.finish()
         read = [*runs.warnings, *self._feeds.warnings(), *runs.behind_end]
         totals.finish(runs.language, read, runs.waiting_s(self.job.config))
-        totals.interpolated, iterations = self._sample.proof(self._interpolated)
+        target, force = np.split(np.concatenate(self._sample), [3], axis=1)
+        totals.interpolated, iterations = self._interpolated.real_machine.answers.proof(target, force)
         totals.iterations = max(totals.iterations, iterations)
         return totals
 
@@ -175,7 +179,9 @@ class LongProgram:
         def tell() -> JointTableRows:
             rows = self.totals.add(result, own, part)
             if job is not self.job:
-                self._sample.add(self.job, rows, result.rows.corrected[own])
+                drawn = result.rows.corrected[own] & (self._random.random(len(rows.s)) < self._share)
+                target = self.job.frame.to_machine(rows.target[drawn])
+                self._sample.append(np.concatenate((target, rows.force[drawn]), axis=1))
             return rows
 
         self._tell(tell)

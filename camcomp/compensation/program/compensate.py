@@ -335,7 +335,7 @@ class _Correction:
         both, middle = arcs_out.middles(nodes, bend.use)
         aimed = self._aim_at_others(both)
         solved = aimed.commanded
-        commanded = solved[~middle] + shift[:, :3]
+        commanded = solved.compress(~middle, axis=0) + shift[:, :3]
         circles = Arcs.none(len(commanded))
         to = np.flatnonzero((np.diff(nodes.piece, prepend=-1) == 0) & bend.use[nodes.piece])
         if len(to):

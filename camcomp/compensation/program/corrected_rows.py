@@ -69,7 +69,7 @@ def corrected_rows(
     path = program.path
     k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
     kind = path.kind[track.motion]
-    start, stop = commanded[nodes.first[:-1]], commanded[nodes.first[1:] - 1]
+    start, stop = (commanded.take(at, axis=0) for at in (nodes.first[:-1], nodes.first[1:] - 1))
     before = path.start[:1] if begins else start[:1]
     step = sizes(start - np.concatenate((before, stop[:-1])))
     layout = row_layout(path, track, step, program.step_mm(job.config.control.resolution_mm))

@@ -52,7 +52,8 @@ class JudgedPoints:
         """How far (mm) in each piece (pieces,) errors (k, 3) at the middles of lines lie off the mean of those at their ends."""
         at = np.flatnonzero((self.fraction == 0.5) & self.judged & (self.row > 0))
         end, row = np.flatnonzero(self.end), self.row[at]
-        sag = sizes(error[at] - 0.5 * (error[end[row - 1]] + error[end[row]]))
+        middle, before, behind = (error.take(each, axis=0) for each in (at, end[row - 1], end[row]))
+        sag = sizes(middle - 0.5 * (before + behind))
         out = np.zeros(pieces)
         np.fmax.at(out, self.piece[at], sag)
         return out

@@ -57,7 +57,7 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
     found = segments(moves)
     first, last = found.first, found.last
     m = len(first)
-    start, end = moves.start[first], moves.end[last]
+    start, end = moves.start.take(first, axis=0), moves.end.take(last, axis=0)
     kind, feed = moves.kind[last], moves.feed[last]
     nominal, leave, most = np.empty(m), np.empty((m, 3)), np.empty(m)
     straight(*read_only(start, end), nominal, leave, most)
