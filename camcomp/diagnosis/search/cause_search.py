@@ -7,6 +7,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.cause_sets import (
     Fitted,
+    misfit,
     probabilities,
     temperature_of,
 )
@@ -116,7 +117,7 @@ def _rank_answers(problem: Problem, sets: FittedSets) -> tuple[RankedSets, float
         best = fits[int(np.argmax(probability))]
         if best.members in sets.searched:
             break
-    return rank(fits, probability, _same(fits, best)), temperature
+    return rank(fits, probability, _same(problem, fits, best)), temperature
 
 
 def _keep_causes(
@@ -212,10 +213,21 @@ def _modelled(problem: Problem, f: Fitted) -> float:
     return min(MODELLED * max(together, *alone, 0.0), LEFT_OPEN * together)
 
 
-def _same(fits: Sequence[Fitted], best: Fitted) -> list[Members]:
-    """Sets of the size of the best one that fit as well, whatever the prior says of them."""
+def _same(problem: Problem, fits: Sequence[Fitted], best: Fitted) -> list[Members]:
+    """Sets of the size of the best one that fit as well, whatever the prior says of them, of their sizes and of how many
+    parameters they have.
+    """
+
+    def left(f: Fitted) -> float:
+        return misfit(f.data, problem.prior, problem.member_columns(f.members))
+
+    def of_their_signs(f: Fitted) -> bool:
+        sign = problem.prior.sign[problem.member_columns(f.members)]
+        return bool(np.all((sign == 0.0) | (f.theta > 0.0)))
+
+    others = [f for f in fits if f is not best and len(f.members) == len(best.members) and best.members]
     return [
         f.members
-        for f in fits
-        if f is not best and len(f.members) == len(best.members) and best.log_evidence - f.log_evidence < EQUAL_LOG_ODDS
+        for f in others
+        if of_their_signs(f) and min(0.5 * (left(f) - left(best)), best.log_evidence - f.log_evidence) < EQUAL_LOG_ODDS
     ]
