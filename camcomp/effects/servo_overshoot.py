@@ -47,13 +47,14 @@ def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[st
     """Loop of logs of one axis by least squares, jointly with a constant and a first-order lag; empty where the axis rests or no
     loop of a feed drive is like it.
 
-    runs: time (n,) s, set-points (n,), encoders (n,).
+    runs: time (n,) s, set-points (n,), encoders (n,), NaN at instants between rows.
     """
     runs = [run for run in runs if len(run[0]) > 4 and np.ptp(run[1]) > 0.0]
     if not runs:
         return {}
-    gap = np.concatenate([x - y for _, x, y in runs])
-    beside = np.concatenate([np.stack([np.ones(len(t)), np.gradient(x, t)], axis=1) for t, x, _ in runs])
+    read = np.isfinite(np.concatenate([y for _, _, y in runs]))
+    gap = np.concatenate([x - y for _, x, y in runs])[read]
+    beside = np.concatenate([np.stack([np.ones(len(t)), np.gradient(x, t)], axis=1) for t, x, _ in runs])[read]
     Q = np.linalg.qr(beside)[0]
     lagged = max(float(np.linalg.lstsq(beside, gap, rcond=None)[0][1]), _LEAST_LAG_S)
 
@@ -64,7 +65,7 @@ def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[st
         swung = [x[:, None] + second_order(x[:, None], t, period, damping) for t, x, _ in runs]
         late = [first_order(each, t, lag, seams) for each, (t, _, _), seams in zip(swung, runs, begun, strict=True)]
         swings = np.concatenate([x - each[:, 0] for (_, x, _), each in zip(runs, late, strict=True)])
-        rest = gap - swings
+        rest = gap - swings[read]
         return np.asarray(rest - Q @ (Q.T @ rest))
 
     grid = [np.log([period, damping, lagged]) for period in _PERIODS_S for damping in _DAMPINGS]

@@ -48,7 +48,7 @@ def first_guess(runs: Sequence[tuple[Floats, Floats, Floats]]) -> float:
     runs: time (n,) s, set-points (n,), encoders (n,) of one actuator.
     """
     runs = [run for run in runs if len(run[0]) > 1 and np.ptp(run[0]) > 0.0]
-    fastest = _fastest(runs)
+    fastest = _fastest([(t, x) for t, x, _ in runs])
     if fastest == 0.0:
         return NO_LIMIT
     shares = np.geomspace(0.02, 1.0, 80)
@@ -61,10 +61,11 @@ def first_guess(runs: Sequence[tuple[Floats, Floats, Floats]]) -> float:
 def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[str, float]:
     """Largest speed and dead time of logs of one axis by least squares; empty where a dead time alone explains as much.
 
-    runs: as in `first_guess`.
+    runs: as in `first_guess`; encoders NaN at instants between rows.
     """
     runs = [run for run in runs if len(run[0]) > 1 and np.ptp(run[0]) > 0.0]
-    fastest = max((float(np.abs(np.diff(y) / np.maximum(np.diff(t), 1e-9)).max()) for t, _, y in runs), default=0.0)
+    read = [np.isfinite(y) for _, _, y in runs]
+    fastest = _fastest([(t[on], y[on]) for (t, _, y), on in zip(runs, read, strict=True)])
     if fastest == 0.0:
         return {}
     first = min(
@@ -77,14 +78,16 @@ def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[st
     return {"speed_rad_per_s" if hinge else "speed_mm_per_s": speed, "dead_time_ms": 1e3 * dead}
 
 
-def _fastest(runs: Sequence[tuple[Floats, Floats, Floats]]) -> float:
-    return max((float(np.abs(np.diff(x) / np.maximum(np.diff(t), 1e-9)).max()) for t, x, _ in runs), default=0.0)
+def _fastest(runs: Sequence[tuple[Floats, Floats]]) -> float:
+    return max(
+        (float(np.abs(np.diff(x) / np.maximum(np.diff(t), 1e-9)).max(initial=0.0)) for t, x in runs), default=0.0
+    )
 
 
 def _left(runs: Sequence[tuple[Floats, Floats, Floats]], speed: float, dead: float = 0.0) -> float:
     """Sum of squares that a limit leaves of the encoders."""
     return sum(
-        float(np.sum((y - rate_limited(_delayed(x[:, None], t, dead), t, speed)[:, 0]) ** 2)) for t, x, y in runs
+        float(np.nansum((y - rate_limited(_delayed(x[:, None], t, dead), t, speed)[:, 0]) ** 2)) for t, x, y in runs
     )
 
 

@@ -126,6 +126,15 @@ class DrivenAxis:
         plain = self._motion(self.run.time, (self.run.encoder if self.way is None else self.way) / self.lever)
         return replace(plain, held=lambda: self.weight[:, None]) if self.weight.any() else plain
 
+    @property
+    def read(self) -> Floats:
+        """Encoders (n,) at the instants of `asked`, NaN between the rows."""
+        time = self.asked.time
+        return (
+            np.where(np.isin(time, self.run.time), np.interp(time, self.run.time, self.run.encoder), np.nan)
+            / self.lever
+        )
+
     def channel(self, name: ChannelName, causes: Sequence[Cause]) -> Floats:
         """Effect of causes on a channel (n,), in the study's mm or N: set-point - encoder, load - encoder, drive force."""
         names = (self.actuator.name,)
@@ -282,10 +291,7 @@ def _shapes(
     switches = {p.name: p.either for p in own if p.either}
     settings = [dict(zip(switches, values, strict=True)) for values in product(*switches.values())]
     if channel == "following" and hasattr(module, "guess"):
-        runs = [
-            (a.asked.time, a.asked.encoder[:, 0], np.interp(a.asked.time, a.run.time, a.run.encoder / a.lever))
-            for a in axes
-        ]
+        runs = [(a.asked.time, a.asked.encoder[:, 0], a.read) for a in axes]
         guess = module.guess(runs, axes[0].actuator.revolute)
         return [{**each, **guess} for each in settings] if guess else []
     scanned = [p for p in own if p.scan]

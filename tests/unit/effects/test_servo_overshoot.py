@@ -138,3 +138,17 @@ def test_an_effect_that_guesses_its_shape_says_among_how_many():
     """The best of so many is prior evidence for none of them: one of the others would have fitted as well by chance."""
     guessing = [module for _, module in shelf.usable("effects") if hasattr(module, "guess")]
     assert len(guessing) > 1 and all(module.GUESSED_FROM > 50 for module in guessing)
+
+
+def test_it_is_guessed_from_the_rows_alone():
+    """Encoders every 10 ms, beside a lag: a straight line between them is off by more than the loop swings."""
+    w, lag, rows = 2.0 * np.pi / 0.05, 0.004, slice(None, None, 10)
+    swung = loop(WAY, [2 * 0.6 * w, w * w], [1.0, 2 * 0.6 * w, w * w])
+    read = np.full_like(WAY, np.nan)
+    read[rows] = loop(swung, [1.0], [lag, 1.0])[rows]
+    effect = shelf.load("effects", "servo_overshoot")
+    found = effect.public(effect.guess([(T, WAY, read)], hinge=False))
+    assert found == pytest.approx({"period_ms": 50.0, "damping": 0.6}, rel=0.02)
+    lines = np.interp(T, T[rows], read[rows])
+    found = effect.public(effect.guess([(T, WAY, lines)], hinge=False))
+    assert found != pytest.approx({"period_ms": 50.0, "damping": 0.6}, rel=0.02)
