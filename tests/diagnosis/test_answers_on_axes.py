@@ -58,10 +58,11 @@ WRONG = {
     50017: "a lag that differs between the ways by a quarter of the floor",
     50026: "heavier tails while the axis stands",
     37052: "one cause on two axes, reversals between rows",
+    10000167: "a lag beside an overshoot, at first sight a drive at its largest speed after a dead time",
 }
 
 
-IN_CI = (31031, 37018, 37026, 37051)
+IN_CI = (31031, 37018, 37026, 10000167)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ import numpy as np
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.channel_data import ChannelData, shrunk
 from camcomp.diagnosis.axis.effect_columns import AxisCause
-from camcomp.diagnosis.axis.gate import KNOWN
+from camcomp.diagnosis.axis.gate import KNOWN, LOCAL
 from camcomp.diagnosis.axis.row_noise import noise_after_fit
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
@@ -27,7 +27,7 @@ from camcomp.diagnosis.model.explain import Explanation, posterior_of
 from camcomp.diagnosis.model.group import Group
 from camcomp.diagnosis.model.imitation import probability_with_unmodelled
 from camcomp.diagnosis.model.noise import MINOR
-from camcomp.diagnosis.model.search import search_sets
+from camcomp.diagnosis.model.search import ROUNDS, search_sets, sets_of_places
 from camcomp.diagnosis.result.types import Estimate, FoundCause
 from camcomp.ground.datatypes import Floats
 
@@ -91,8 +91,46 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
         left, _, sizes = _left(data, terms, linear)
         data = data.refined(left, sizes)
         terms, at = _shaped(data, terms, members, moved, sd)
+    if data.channel == "following" and _excess(data, terms, linear) > LOCAL * data.floor**2:
+        terms, linear, sd = _among_every_set(data, terms)
+    terms, linear = _without_needless_parameters(data, terms, linear, sd)
     terms, linear = _without_needless(data, terms, linear, sd)
     return _answer(data, terms, linear, sd)
+
+
+def _excess(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear) -> float:
+    """Mean square of what causes and healthy sizes leave of the fitted runs, each row over its noise."""
+    left = _left(data, terms, linear, small=False)[0]
+    return float(np.mean(data.in_floors(dict(enumerate(left))) ** 2))
+
+
+def _among_every_set(data: ChannelData, terms: Sequence[AxisCause]) -> tuple[Sequence[AxisCause], _Linear, float]:
+    """The most probable of all sets of causes of a loop, each with its own shapes and made linear where it stands.
+
+    Loops of one axis are much alike as long as they are linear, so that steps from one set do not lead to every other. With the
+    deviation of a row that the best of them leaves.
+    """
+    fits = {}
+    for on in sets_of_places([t.place for t in terms], CAUSES):
+        at = [np.zeros(len(t.parameters)) for t in terms]
+        linear, by = _settled(data, terms, at, on=on, sd=data.floor, passes=1), [*terms]
+        amount = _by_term(linear.found.amplitudes()[0], terms)
+        at = [amount[i] if i in on else each for i, each in enumerate(at)]
+        for _ in range(ROUNDS):
+            by, at = _shaped(data, by, on, at, data.floor)
+        responses = [_columns(data, by, k, at) for k in range(len(data.values))]
+        fits[on] = by, responses, _noise(data, responses)
+    sd = min(noise for _, _, noise in fits.values())
+    linear_of = {on: _explained(data, by, responses, sd, on) for on, (by, responses, _) in fits.items()}
+    best = max(fits, key=lambda on: _value(linear_of[on]))
+    return fits[best][0], linear_of[best], sd
+
+
+def _value(fit: _Linear) -> float:
+    """Log evidence of a fit, with a function of one covariate where that adds to it."""
+    found = fit.found
+    gains = gains_of_more(fit.model, found.background, found.members)
+    return float(found.log_evidence + max(0.0, *gains.values()))
 
 
 def _without_needless(
@@ -102,11 +140,6 @@ def _without_needless(
 
     Sets are made linear where they stand. A cause goes, too, where it is as large as on every healthy machine.
     """
-
-    def misfit(fit: _Linear, own: Sequence[AxisCause]) -> float:
-        left = _left(data, own, fit, small=False)[0]
-        return float(np.mean(data.in_floors(dict(enumerate(left))) ** 2))
-
     while linear.found.members:
         own = [terms[i] for i in linear.found.members]
         amount = _by_term(linear.found.amplitudes()[0], terms)
@@ -114,28 +147,67 @@ def _without_needless(
         every = tuple(range(len(own)))
         sets = [every, *(tuple(i for i in every if i != out) for out in every)]
         fits = {on: _settled(data, own, at, on=on, sd=sd) for on in sets}
-        value = {
-            on: found.log_evidence + max(0.0, *gains_of_more(fit.model, found.background, found.members).values())
-            for on, fit in fits.items() for found in [fit.found]
-        }  # fmt: skip
+        value = {on: _value(fit) for on, fit in fits.items()}
         best = max(sets[1:], key=lambda on: value[on])
-        more = misfit(fits[best], own) - misfit(fits[every], own)
+        more = _excess(data, own, fits[best]) - _excess(data, own, fits[every])
         if value[best] < value[every] and more > (MINOR * data.floor) ** 2:
             break
         terms, linear = own, fits[best]
     return terms, linear
 
 
+def _without_needless_parameters(
+    data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: float
+) -> tuple[Sequence[AxisCause], _Linear]:
+    """The fit with the causes of fewer parameters that are more probable where they stand, as the linear ones did not show."""
+    every = tuple(range(len(linear.found.members)))
+    by, fit = terms, linear
+    while True:
+        amount, own = _by_term(fit.found.amplitudes()[0], by), [by[i] for i in fit.found.members]
+        at = [amount[i] for i in fit.found.members]
+        options = _with_fewer_parameters(own, at, terms)
+        if not options:
+            return by, fit
+        shaped = [(own, at), *(_shaped(data, less, every, begun, sd) for less, begun in options)]
+        fits = [_settled(data, each, begun, on=every, sd=sd) for each, begun in shaped]
+        best = max(range(len(fits)), key=lambda k: fits[k].found.log_evidence)
+        if best == 0:
+            return by, fit
+        by, fit = shaped[best][0], fits[best]
+
+
+def _with_fewer_parameters(
+    own: Sequence[AxisCause], at: Sequence[Floats], terms: Sequence[AxisCause]
+) -> list[tuple[list[AxisCause], list[Floats]]]:
+    """Causes and amplitudes with one of them replaced by a candidate of its place that lacks parameters of it."""
+    out = {}
+    for i, term in enumerate(own):
+        names = [p.name for p in term.parameters]
+        for other in terms:
+            less = [p.name for p in other.parameters]
+            if other.place == term.place and set(less) < set(names) and set(other.shape) <= set(term.shape):
+                by = replace(other, shape={key: term.shape[key] for key in other.shape})
+                kept = at[i][[names.index(name) for name in less]]
+                out[i, *less] = [*own[:i], by, *own[i + 1 :]], [*at[:i], kept, *at[i + 1 :]]
+    return list(out.values())
+
+
 def _settled(
-    data: ChannelData, terms: Sequence[AxisCause], at: Sequence[Floats], *, on: tuple[int, ...], sd: float
+    data: ChannelData,
+    terms: Sequence[AxisCause],
+    at: Sequence[Floats],
+    *,
+    on: tuple[int, ...],
+    sd: float,
+    passes: int = PASSES,
 ) -> _Linear:
     """The fit of one set of causes, made linear where it stands."""
     at = [each if i in on else np.zeros(len(each)) for i, each in enumerate(at)]
-    for again in range(PASSES):
+    for again in range(passes):
         responses = [_columns(data, terms, k, at) for k in range(len(data.values))]
         linear = _explained(data, terms, responses, sd, on)
         amount = _by_term(linear.found.amplitudes()[0], terms)
-        if again < PASSES - 1:
+        if again < passes - 1:
             at = [amount[i] if i in on else each for i, each in enumerate(at)]
     return linear
 
@@ -170,8 +242,6 @@ def _shaped(
             if (left := _misfit(data, by, members, at, sd)) < base:
                 terms, base = by, left
     names = _scanned(terms, members)
-    if not names:
-        return terms, at
     change, _ = _jointly(data, terms, members, at, sd)
     for share in (1.0, 0.3, 0.1):
         moved, by, place = [*at], [*terms], 0

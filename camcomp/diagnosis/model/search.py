@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import combinations, product
 
 import numpy as np
 
+from camcomp.diagnosis.model.candidates import Place
 from camcomp.diagnosis.model.evidence import LONG, Members, Reduced
 
 MOST = 5  # causes of a set
@@ -17,6 +19,13 @@ SLACK = 6.0  # log posterior by which the best set of a size may lie behind, and
 def best_of(values: Mapping[Members, float]) -> Members:
     """The most probable of sets with their log posteriors."""
     return max(values, key=lambda m: (values[m], m))
+
+
+def sets_of_places(places: Sequence[Place], most: int) -> list[Members]:
+    """All sets of up to `most` candidates, with one of each place at most. places: of the candidates."""
+    at = {place: [i for i, each in enumerate(places) if each == place] for place in places}
+    some = [own for n in range(most + 1) for own in combinations(at.values(), n)]
+    return [tuple(sorted(each)) for own in some for each in product(*own)]
 
 
 def search_sets(data: Reduced, most: int = MOST) -> dict[Members, float]:
