@@ -295,3 +295,32 @@ def test_friction_that_is_gone_at_rest_is_no_stribeck_friction(tmp_path):
     sizes = {name: each.value for name, each in friction.parameters.items()}
     assert sizes["force_N"] == pytest.approx(150.0, rel=0.03) and sizes.get("stribeck_N", 0.0) < 15.0
     assert sizes["viscous_Ns_per_mm"] == pytest.approx(1.2, rel=0.1)
+
+
+def test_friction_shows_in_ten_rows_a_second(tmp_path):
+    """Of a slide that stops ever so often: by which way it moves, and how fast, rows near a stop do not tell."""
+    step, coulomb, viscous, lag = 1e-3, 150.0, 1.2, 0.0115
+    for name in "ab":
+        rng = np.random.default_rng(ord(name))
+        asked_speed, at = np.zeros(110_000), 0
+        while at < 107_000:
+            feed, length = rng.uniform(2.0, 50.0) * rng.choice([-1.0, 1.0]), int(rng.uniform(500, 2500))
+            asked_speed[at : at + length] = feed
+            at += int(rng.uniform(600, 3000))
+        asked_speed = np.convolve(asked_speed, np.hanning(200) / np.hanning(200).sum(), mode="same")
+        decay = np.exp(-step / lag)
+        speed = lfilter([1.0 - decay], [1.0, -decay], asked_speed)
+        force = coulomb * np.tanh(speed / 0.3) + viscous * speed + 0.05 * np.gradient(speed, step)
+        wanted, way = np.cumsum(asked_speed) * step, np.cumsum(speed) * step
+        rows = np.arange(50, len(way), 100)
+        write(tmp_path, name, {
+            "t_s": step * rows, "cmd_x_mm": wanted[rows], "act_x_mm": way[rows] + rng.normal(0.0, 2e-4, len(rows)),
+            "act_x_N": force[rows] + rng.normal(0.0, 3.0, len(rows)),
+        })  # fmt: skip
+    result = asked(tmp_path, [str(ROOT / "config/cartesian.yaml")], "ab")
+    assert result.verdict == "identified" and {c.effect for c in result.causes} == {"friction", "servo_lag"}
+    (friction,) = [c for c in result.causes if c.effect == "friction"]
+    assert "stribeck_N" not in friction.parameters
+    for name, true in (("force_N", coulomb), ("viscous_Ns_per_mm", viscous)):
+        low, high = friction.parameters[name].ci95
+        assert low <= true <= high and high - low < 0.2 * true, name

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import norm
 
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName
 from camcomp.diagnosis.axis.findings import AxisRun
@@ -18,6 +19,7 @@ LEAST = 1e-3  # of the largest column: below it bodies do not show
 HEALTHY_SHARE = 0.3  # of the channel's size: scale of a size that every axis has
 FORM = 0.2  # of the torque by which friction of a hinge is smaller while it turns round: laws of that are no better than this
 CLOCK, TURNING = "clock", "turning"  # kinds: rows that are late; friction while it turns round, limited by its peak
+BETWEEN = "between rows"  # kind: motion between two rows, as far off as it may be
 BODIES = "bodies"  # kind: masses, first moments and inertias of the links behind a hinge, as a base of their columns
 Sizes = Mapping[str, Floats]  # kind -> columns (n, q)
 Response = Callable[[int, Sequence[tuple[AxisCause, Floats]]], Floats]  # run, causes that act -> values (n,)
@@ -34,7 +36,8 @@ class ChannelData:
 
     train, test: runs that are fitted, and that are judged only. numbers: of the runs in their experiment. floor: noise of the
     channel. whole: times and values of every row. asymmetric: whether friction in the drive force differs between the
-    directions, which deflects the loop. noise (n,) per run: of rows, in floors; 1 where it is not given. healthy: columns of
+    directions, which deflects the loop. noise (n,) per run: of rows, in floors; 1 where it is not given. between (n, 2) per run: what it is not known to for want
+    of set-points between its rows. healthy: columns of
     the sizes that every axis has; inertia: those that are force of inertia alone. covariates (n,) of the dictionary. response:
     what causes with their amplitudes (d,) add to the channel of run k (n,). level: constant without a meaning. clock: standard
     deviation of the instants of rows against the motion, s. scatter: of the encoders by which the axis moved, row by row.
@@ -52,6 +55,7 @@ class ChannelData:
     whole: Sequence[tuple[Floats, Floats]]
     asymmetric: bool = False
     noise: Sequence[Floats] = ()
+    between: Sequence[Floats] = ()
     healthy: Sequence[Sizes] = ()
     inertia: Sequence[Sizes] = ()
     covariates: Sequence[Mapping[str, Floats]] = ()
@@ -100,16 +104,22 @@ class ChannelData:
             most = HEALTHY_SHARE * max(size, self.floor)
             out[kind] = np.divide(most, each, out=np.zeros_like(each), where=each > 0.0)
             out[kind] = np.full(1, self.clock) if kind == CLOCK else out[kind]
+            out[kind] = np.ones(own.shape[1]) if kind == BETWEEN else out[kind]
             out[kind] = np.full(n := own.shape[1], most / np.sqrt(max(n, 1))) if kind == BODIES else out[kind]
         return out
 
-    def form_of_turning(self, run: int, sizes: Mapping[str, Floats]) -> Floats:
-        """What friction (n,) of a hinge is not known to while it turns round; sizes: healthy ones by kind."""
-        return np.asarray(FORM * self.hinge * (self.healthy[run][TURNING] @ sizes[TURNING]))
+    def friction_unknown(self, run: int, sizes: Mapping[str, Floats], caused: Floats) -> Floats:
+        """What friction (n,) is not known to, row by row: its form while it turns round, in a hinge, and which way it acts.
+
+        sizes: healthy ones by kind. caused (n,): force of the causes.
+        """
+        form = FORM * self.hinge * (self.healthy[run][TURNING] @ sizes[TURNING])
+        return np.asarray(np.hypot(form, caused * sense_unknown(self.moves[run])))
 
     def refined(self, left: Sequence[Floats], sizes: Mapping[str, Floats]) -> ChannelData:
         """The data with a column for rows that are later or earlier than the motion, and with the noise of rows in which inertia
-        is not known to the floor, for the instant of a force within its row is not, or friction, while it turns round.
+        is not known to the floor, for the instant of a force within its row is not, or friction, while it turns round or may act
+        either way.
 
         left: residuals (n,) per run. sizes: healthy sizes by kind of the same fit.
         """
@@ -118,7 +128,8 @@ class ChannelData:
         own = [y - each for y, each in zip(self.values, left, strict=True)]
         slopes = [np.gradient(each, m.time)[:, None] for each, m in zip(own, self.moves, strict=True)]
         inertia = [np.sum([own[kind] @ sizes[kind] for kind in own], axis=0) for own in self.inertia]
-        forms = [self.form_of_turning(k, sizes) for k in range(len(self.moves))]
+        caused = [each - sum(h[kind] @ sizes[kind] for kind in h) for each, h in zip(own, self.healthy, strict=True)]
+        forms = [self.friction_unknown(k, sizes, each) for k, each in enumerate(caused)]
         return replace(
             self, healthy=[{**own, CLOCK: each} for own, each in zip(self.healthy, slopes, strict=True)],
             noise=[
@@ -126,6 +137,16 @@ class ChannelData:
                 for each, form in zip(inertia, forms, strict=True)
             ],
         )  # fmt: skip
+
+
+def sense_unknown(move: AxisTravel) -> Floats:
+    """Standard deviation (n,) of the sense in which an axis moves, 1 where it may be either.
+
+    The speed of a row is not known to what the acceleration changes within a row.
+    """
+    unsure = within_a_row(move.acceleration) * np.gradient(move.time)
+    forth = norm.cdf(np.divide(np.abs(move.speed), unsure, out=np.full(len(unsure), np.inf), where=unsure > 0.0))
+    return np.asarray(2.0 * np.sqrt(forth * (1.0 - forth)))
 
 
 def base_of(columns: Sequence[Floats]) -> Floats:

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.channel_data import BODIES, TURNING, ChannelData, base_of, healthy_sizes
+from camcomp.diagnosis.axis.channel_data import BETWEEN, BODIES, TURNING, ChannelData, base_of, healthy_sizes
 from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel
 from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, DrivenAxis, candidates
@@ -183,6 +183,8 @@ def _healthy(
             own |= {"friction": np.tanh(m.speed / max(CREEP * rows.fastest, 1e-12))[:, None], "weight": weight}
         elif rows.channel == "following":
             own["friction"] = np.stack([m.reversal(way) for way in TURNS_MM], axis=1)
+        if rows.between:
+            own[BETWEEN] = rows.between[k]
         if rows.asymmetric:
             own["asymmetry"] = np.abs(m.speed)[:, None]
         if force:
@@ -329,7 +331,11 @@ def _channel(rows: ChannelData, done: ChannelFit, sure: Sequence[Bools]) -> Axis
     if rows.channel == "force":  # beside what laws of friction and inertia are known to
         rise = shelf.load("effects", "disturbance").RISE_S
         own = [
-            np.hypot(not_known(values[k] - done.left[k] - constant), rows.form_of_turning(k, done.sizes)) for k in order
+            np.hypot(
+                not_known(values[k] - done.left[k] - constant),
+                rows.friction_unknown(k, done.sizes, rows.response(k, done.acting)),
+            )
+            for k in order
         ]
         known = [np.hypot(each, rising(pushed[k], moves[k].time, rise)) for k, each in zip(order, own, strict=True)]
         left = [each / np.hypot(1.0, by / rows.floor) for each, by in zip(left, known, strict=True)]

@@ -65,7 +65,7 @@ def following_floor(pairs: Sequence[tuple[Floats, Floats]]) -> float:
 
 
 def between_rows(time: Floats, setpoint: Floats, late_s: float) -> Floats:
-    """What a following error (n,) mm is not known to, because nobody logged how set-points went between two rows.
+    """What a following error is not known to (n, 2) mm, by the rows on either side, because nobody logged how set-points went between two rows.
 
     A loop of first order that follows `late_s` behind remembers, dt later, e^-x (x = dt / late_s) of how far its set-points
     were off the straight line between rows. A constant acceleration a is off by a s (dt - s) / 2 within a row, of which the loop
@@ -73,10 +73,11 @@ def between_rows(time: Floats, setpoint: Floats, late_s: float) -> Floats:
     as far as the set-points' own scatter does not show the same.
     """
     if late_s <= 0.0 or len(time) < 5:
-        return np.zeros(len(time))
+        return np.zeros((len(time), 2))
     x = float(np.median(np.diff(time))) / late_s
     share = (x - 2.0 + (x + 2.0) * np.exp(-x)) / (2.0 * x**2)
     quiet = float(np.quantile(np.abs(np.diff(setpoint, 4)), QUIET)) / float(norm.isf(0.5 - 0.5 * QUIET)) / np.sqrt(70.0)
-    change = np.maximum(np.abs(np.diff(setpoint, 3)) - 3.0 * np.sqrt(20.0) * quiet, 0.0)
-    rows = np.maximum(np.pad(change, (1, 2), "edge"), np.pad(change, (2, 1), "edge"))  # on either side of a row
-    return np.asarray(lfilter([share], [1.0, -np.exp(-x)], rows))
+    change = np.diff(setpoint, 3)
+    change = np.sign(change) * np.maximum(np.abs(change) - 3.0 * np.sqrt(20.0) * quiet, 0.0)
+    rows = np.stack([np.pad(change, (1, 2), "edge"), np.pad(change, (2, 1), "edge")], axis=1)  # on either side of a row
+    return np.asarray(lfilter([share], [1.0, -np.exp(-x)], rows, axis=0))

@@ -41,7 +41,7 @@ def test_what_a_straight_line_between_rows_misses_is_expected_at_its_size():
     rows = setpoint[:: round(STEP_S / FINE_S)]
     straight = np.interp(np.arange(len(setpoint)) * FINE_S, np.arange(len(rows)) * STEP_S, rows)
     off = seen(followed(setpoint, late)) - seen(followed(straight, late))
-    expected = between_rows(np.arange(len(rows)) * STEP_S, rows, late)
+    expected = np.abs(between_rows(np.arange(len(rows)) * STEP_S, rows, late)).max(axis=1)
     for low, high in ((2e-3, 2e-2), (2e-2, 5e-2), (5e-2, 1.0)):
         rows = (expected > low) & (expected < high)
         assert rows.sum() > 100
