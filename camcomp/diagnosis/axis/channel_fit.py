@@ -15,27 +15,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.channel_data import ChannelData, shrunk
+from camcomp.diagnosis.axis.channel_data import ChannelData
 from camcomp.diagnosis.axis.effect_columns import AxisCause
 from camcomp.diagnosis.axis.gate import KNOWN, LOCAL
+from camcomp.diagnosis.axis.linear_sets import (
+    CAUSES,
+    PASSES,
+    LinearFit,
+    by_term,
+    covariate_ranges,
+    explained,
+    joint_columns,
+    jointly,
+    noise_of_rows,
+    refined_shapes,
+    residuals,
+    scanned,
+    settled,
+)
 from camcomp.diagnosis.axis.row_noise import noise_after_fit
 from camcomp.diagnosis.model.calibration import calibration_of
-from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
-from camcomp.diagnosis.model.discrepancy import covariate_columns, gains_of_more, smooth_functions
-from camcomp.diagnosis.model.evidence import Background, LinearModel
-from camcomp.diagnosis.model.explain import Explanation, posterior_of
-from camcomp.diagnosis.model.group import Group
+from camcomp.diagnosis.model.discrepancy import gains_of_more, smooth_functions
 from camcomp.diagnosis.model.imitation import probability_with_unmodelled
 from camcomp.diagnosis.model.noise import MINOR
-from camcomp.diagnosis.model.search import ROUNDS, search_sets, sets_of_places
+from camcomp.diagnosis.model.search import ROUNDS, sets_of_places
 from camcomp.diagnosis.result.types import Estimate, FoundCause
 from camcomp.ground.datatypes import Floats
-
-STEP = 1e-3  # of an amplitude in scales, for slopes
-PASSES = 3  # in which columns are made linear again where the fit stands
-MOST_CHANGE = 0.7  # of the logarithm of a shape in one step
-CAUSES = 3  # of one channel of one axis
-SHAPE_SD = 1.5  # of the logarithm of a shape: scans of shapes span four
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -67,30 +72,23 @@ class ChannelFit:
         return Estimate.stated(value, value - half, value + half)
 
 
-@dataclass(frozen=True, eq=False)
-class _Linear:
-    model: LinearModel
-    found: Explanation
-    unit: Mapping[str, Floats]  # of healthy columns: channel units per amplitude of the model
-
-
 def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     """The most probable causes of a channel, their sizes and the residual."""
     at = [np.zeros(len(t.parameters)) for t in terms]
     for again in range(PASSES + 1):
-        responses = [_columns(data, terms, k, at) for k in range(len(data.values))]
-        sd = _noise(data, responses)
-        linear = _explained(data, terms, responses, sd)
+        responses = [joint_columns(data, terms, k, at) for k in range(len(data.values))]
+        sd = noise_of_rows(data, responses)
+        linear = explained(data, terms, responses, sd)
         members = linear.found.members
-        amount = _by_term(linear.found.amplitudes()[0], terms)
+        amount = by_term(linear.found.amplitudes()[0], terms)
         moved = [amount[i] if i in members else np.zeros(len(t.parameters)) for i, t in enumerate(terms)]
         same = all(np.allclose(a, b, rtol=1e-3, atol=1e-6) for a, b in zip(at, moved, strict=True))
         late = data.clock > 0.0 and again == 0  # rows may be late without any cause, too
         if again == PASSES or (not late and (same or not members)):
             break
-        left, _, sizes = _left(data, terms, linear)
+        left, _, sizes = residuals(data, terms, linear)
         data = data.refined(left, sizes)
-        terms, at = _shaped(data, terms, members, moved, sd)
+        terms, at = refined_shapes(data, terms, members, moved, sd)
     if data.channel == "following" and _excess(data, terms, linear) > LOCAL * data.floor**2:
         terms, linear, sd = _among_every_set(data, terms)
     terms, linear = _without_needless_parameters(data, terms, linear, sd)
@@ -98,13 +96,13 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     return _answer(data, terms, linear, sd)
 
 
-def _excess(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear) -> float:
+def _excess(data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit) -> float:
     """Mean square of what causes and healthy sizes leave of the fitted runs, each row over its noise."""
-    left = _left(data, terms, linear, small=False)[0]
+    left = residuals(data, terms, linear, small=False)[0]
     return float(np.mean(data.in_floors(dict(enumerate(left))) ** 2))
 
 
-def _among_every_set(data: ChannelData, terms: Sequence[AxisCause]) -> tuple[Sequence[AxisCause], _Linear, float]:
+def _among_every_set(data: ChannelData, terms: Sequence[AxisCause]) -> tuple[Sequence[AxisCause], LinearFit, float]:
     """The most probable of all sets of causes of a loop, each with its own shapes and made linear where it stands.
 
     Loops of one axis are much alike as long as they are linear, so that steps from one set do not lead to every other. With the
@@ -113,20 +111,20 @@ def _among_every_set(data: ChannelData, terms: Sequence[AxisCause]) -> tuple[Seq
     fits = {}
     for on in sets_of_places([t.place for t in terms], CAUSES):
         at = [np.zeros(len(t.parameters)) for t in terms]
-        linear, by = _settled(data, terms, at, on=on, sd=data.floor, passes=1), [*terms]
-        amount = _by_term(linear.found.amplitudes()[0], terms)
+        linear, by = settled(data, terms, at, on=on, sd=data.floor, passes=1), [*terms]
+        amount = by_term(linear.found.amplitudes()[0], terms)
         at = [amount[i] if i in on else each for i, each in enumerate(at)]
         for _ in range(ROUNDS):
-            by, at = _shaped(data, by, on, at, data.floor)
-        responses = [_columns(data, by, k, at) for k in range(len(data.values))]
-        fits[on] = by, responses, _noise(data, responses)
+            by, at = refined_shapes(data, by, on, at, data.floor)
+        responses = [joint_columns(data, by, k, at) for k in range(len(data.values))]
+        fits[on] = by, responses, noise_of_rows(data, responses)
     sd = min(noise for _, _, noise in fits.values())
-    linear_of = {on: _explained(data, by, responses, sd, on) for on, (by, responses, _) in fits.items()}
+    linear_of = {on: explained(data, by, responses, sd, on) for on, (by, responses, _) in fits.items()}
     best = max(fits, key=lambda on: _value(linear_of[on]))
     return fits[best][0], linear_of[best], sd
 
 
-def _value(fit: _Linear) -> float:
+def _value(fit: LinearFit) -> float:
     """Log evidence of a fit, with a function of one covariate where that adds to it."""
     found = fit.found
     gains = gains_of_more(fit.model, found.background, found.members)
@@ -134,19 +132,19 @@ def _value(fit: _Linear) -> float:
 
 
 def _without_needless(
-    data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: float
-) -> tuple[Sequence[AxisCause], _Linear]:
+    data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit, sd: float
+) -> tuple[Sequence[AxisCause], LinearFit]:
     """The fit without causes that the others, or a function of one covariate, explain as well.
 
     Sets are made linear where they stand. A cause goes, too, where it is as large as on every healthy machine.
     """
     while linear.found.members:
         own = [terms[i] for i in linear.found.members]
-        amount = _by_term(linear.found.amplitudes()[0], terms)
+        amount = by_term(linear.found.amplitudes()[0], terms)
         at = [amount[i] for i in linear.found.members]
         every = tuple(range(len(own)))
         sets = [every, *(tuple(i for i in every if i != out) for out in every)]
-        fits = {on: _settled(data, own, at, on=on, sd=sd) for on in sets}
+        fits = {on: settled(data, own, at, on=on, sd=sd) for on in sets}
         value = {on: _value(fit) for on, fit in fits.items()}
         best = max(sets[1:], key=lambda on: value[on])
         more = _excess(data, own, fits[best]) - _excess(data, own, fits[every])
@@ -157,19 +155,19 @@ def _without_needless(
 
 
 def _without_needless_parameters(
-    data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: float
-) -> tuple[Sequence[AxisCause], _Linear]:
+    data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit, sd: float
+) -> tuple[Sequence[AxisCause], LinearFit]:
     """The fit with the causes of fewer parameters that are more probable where they stand, as the linear ones did not show."""
     every = tuple(range(len(linear.found.members)))
     by, fit = terms, linear
     while True:
-        amount, own = _by_term(fit.found.amplitudes()[0], by), [by[i] for i in fit.found.members]
+        amount, own = by_term(fit.found.amplitudes()[0], by), [by[i] for i in fit.found.members]
         at = [amount[i] for i in fit.found.members]
         options = _with_fewer_parameters(own, at, terms)
         if not options:
             return by, fit
-        shaped = [(own, at), *(_shaped(data, less, every, begun, sd) for less, begun in options)]
-        fits = [_settled(data, each, begun, on=every, sd=sd) for each, begun in shaped]
+        shaped = [(own, at), *(refined_shapes(data, less, every, begun, sd) for less, begun in options)]
+        fits = [settled(data, each, begun, on=every, sd=sd) for each, begun in shaped]
         best = max(range(len(fits)), key=lambda k: fits[k].found.log_evidence)
         if best == 0:
             return by, fit
@@ -192,212 +190,14 @@ def _with_fewer_parameters(
     return list(out.values())
 
 
-def _settled(
-    data: ChannelData,
-    terms: Sequence[AxisCause],
-    at: Sequence[Floats],
-    *,
-    on: tuple[int, ...],
-    sd: float,
-    passes: int = PASSES,
-) -> _Linear:
-    """The fit of one set of causes, made linear where it stands."""
-    at = [each if i in on else np.zeros(len(each)) for i, each in enumerate(at)]
-    for again in range(passes):
-        responses = [_columns(data, terms, k, at) for k in range(len(data.values))]
-        linear = _explained(data, terms, responses, sd, on)
-        amount = _by_term(linear.found.amplitudes()[0], terms)
-        if again < passes - 1:
-            at = [amount[i] if i in on else each for i, each in enumerate(at)]
-    return linear
-
-
-def _columns(data: ChannelData, terms: Sequence[AxisCause], k: int, at: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Columns (n, k) of all terms jointly with those that act, and the error of their tangents at 0 (n,)."""
-    acting = {i: (term, own) for i, (term, own) in enumerate(zip(terms, at, strict=True)) if own.any()}
-    here = data.response(k, [*acting.values()])
-    columns, offset = [np.zeros((len(here), 0))], here.copy()
-    for i, (term, own) in enumerate(zip(terms, at, strict=True)):
-        first = np.array(term.steps or np.ones(len(own)))
-        step = np.where(own == 0.0, first, STEP * np.maximum(np.abs(own), first))
-        others = [each for j, each in acting.items() if j != i]
-        A = np.stack(
-            [(data.response(k, [*others, (term, own + d)]) - here) / d[j] for j, d in enumerate(np.diag(step))], axis=1
-        )
-        columns.append(A)
-        offset -= A @ own
-    return np.concatenate(columns, axis=1), offset
-
-
-def _shaped(
-    data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats], sd: float
-) -> tuple[list[AxisCause], list[Floats]]:
-    """Terms and amplitudes with the shapes of the causes that act by one Gauss-Newton step, and the better setting of their
-    switches, which causes that are not there yet do not show; as they are where it does not help.
-    """
-    terms, at, base = [*terms], [*at], _misfit(data, terms, members, at, sd)
-    for i in members:
-        for other in terms[i].other_settings:
-            by = [*terms[:i], other, *terms[i + 1 :]]
-            if (left := _misfit(data, by, members, at, sd)) < base:
-                terms, base = by, left
-    names = _scanned(terms, members)
-    change, _ = _jointly(data, terms, members, at, sd)
-    for share in (1.0, 0.3, 0.1):
-        moved, by, place = [*at], [*terms], 0
-        for i in members:
-            moved[i] = at[i] + share * change[place : (place := place + len(at[i]))]
-        for (i, name), own in zip(names, change[place:], strict=True):
-            factor = float(np.exp(np.clip(share * own, -MOST_CHANGE, MOST_CHANGE)))
-            by[i] = replace(by[i], shape={**by[i].shape, name: terms[i].bounded(name, by[i].shape[name] * factor)})
-        if _misfit(data, by, members, moved, sd) < base:
-            return by, moved
-    return terms, at
-
-
-def _scanned(terms: Sequence[AxisCause], members: Sequence[int]) -> list[tuple[int, str]]:
-    """Shapes of members that may have any value."""
-    return [(i, name) for i in members for name in terms[i].scanned if terms[i].shape[name] > 0.0]
-
-
-def _jointly(
-    data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats], sd: float,
-    *, settings: bool = False,
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """Changes (d,) and standard deviations (d,) of amplitudes of members and of logarithms of their shapes.
-
-    They are fitted jointly with healthy sizes under their priors. settings: jointly with other settings of switches, too,
-    which come last.
-    """
-    names = _scanned(terms, members)
-    others = [(i, each) for i in members for each in terms[i].other_settings] if settings else []
-    rows, values = {}, {}
-    for k in data.train:
-
-        def response(i: int, term: AxisCause, amount: Floats, k: int = k) -> Floats:
-            return data.response(k, [(term, amount) if j == i else (terms[j], at[j]) for j in members])
-
-        here = data.response(k, [(terms[j], at[j]) for j in members])
-        own = [data.healthy_columns(k)]
-        for i in members:
-            for d in np.diag(STEP * np.maximum(np.abs(at[i]), 1.0)):
-                own.append((response(i, terms[i], at[i] + d) - here)[:, None] / d.sum())
-        for i, name in names:
-            longer = replace(terms[i], shape={**terms[i].shape, name: terms[i].shape[name] * (1.0 + STEP)})
-            own.append((response(i, longer, at[i]) - here)[:, None] / STEP)
-        own += [(response(i, each, at[i]) - here)[:, None] for i, each in others]
-        rows[k], values[k] = np.concatenate(own, axis=1), data.values[k] - here
-    healthy, amplitudes = np.concatenate([*data.scales.values()]), sum(len(at[i]) for i in members)
-    prior = np.concatenate([healthy, np.full(amplitudes, np.inf), np.full(len(names), SHAPE_SD), np.ones(len(others))])
-    mean, covariance = shrunk(data.in_floors(rows), data.in_floors(values), prior, sd)
-    return mean[len(healthy) :], np.sqrt(np.maximum(np.diag(covariance)[len(healthy) :], 0.0))
-
-
-def _misfit(
-    data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats], sd: float
-) -> float:
-    """Sum of squares, prior included, that causes and healthy sizes leave of the fitted runs."""
-    acting = [(terms[i], at[i]) for i in members]
-    A = data.in_floors({k: data.healthy_columns(k) for k in data.train})
-    y = data.in_floors({k: data.values[k] - data.response(k, acting) for k in data.train})
-    prior = np.concatenate([*data.scales.values()])
-    c, _ = shrunk(A, y, prior, sd)
-    return float(np.sum((y - A @ c) ** 2) + sd**2 * np.sum((c / np.maximum(prior, 1e-30)) ** 2))
-
-
-def _noise(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> float:
-    """Standard deviation of a row that counts as one of its own, from residuals jointly with all columns.
-
-    Rows that are correlated count for less: the variance is that of a row times the rows that count as one.
-    """
-    A = data.in_floors({k: np.hstack((responses[k][0], data.healthy_columns(k))) for k in data.train})
-    y = data.in_floors({k: data.values[k] - responses[k][1] for k in data.train})
-    return noise_after_fit(A, y, data.floor)
-
-
-def _explained(
-    data: ChannelData, terms: Sequence[AxisCause], responses: Sequence[tuple[Floats, Floats]],
-    sd: float, on: tuple[int, ...] | None = None,
-) -> _Linear:  # fmt: skip
-    """The posterior over sets of causes made linear; on: this set alone."""
-    unit, ends = data.scales, _ends(data)
-    groups = []
-    for k in data.train:
-        A, offset = responses[k]
-        y = (data.values[k] - offset)[:, None]
-        n = len(y)
-        white = {kind: (own * unit[kind])[:, None] for kind, own in data.healthy[k].items()}
-        smooth = {
-            name: covariate_columns(smooth_functions(own, *ends[name]), np.full((n, 1, 1), sd))
-            for name, own in data.covariates[k].items() if name in ends
-        }  # fmt: skip
-        groups.append(
-            Group(
-                name=str(k), label="axis", y=y, A=A[:, None], N=np.zeros((n, 1, 0)),
-                sd=sd * (data.noise[k] if data.noise else np.ones(n))[:, None], B={**white, **smooth},
-            )
-        )  # fmt: skip
-    start, placed = 0, []
-    for term in terms:
-        columns = tuple(range(start, start := start + len(term.parameters)))
-        placed.append(PlacedCause(*term.place, columns, term.ways))
-    bounds = AmplitudeBounds.of(
-        [p for t in terms for p in t.parameters], [bool(t.shape) for t in terms for _ in t.parameters]
-    )
-    model = LinearModel(
-        groups=tuple(groups),
-        candidates=tuple(placed),
-        bounds=bounds,
-        healthy=dict.fromkeys(unit, 1.0),
-        floors=sd / data.floor,
-    )
-    data_of = model.reduced(Background())
-    values = search_sets(data_of, CAUSES) if on is None else {on: max(data_of.value(on), -1e300)}
-    return _Linear(model, posterior_of(model, {Background(): values}), unit)
-
-
-def _ends(data: ChannelData) -> dict[str, tuple[float, float]]:
-    """Range of every covariate that moves in the fitted runs."""
-    out = {}
-    for name in data.covariates[0]:
-        values = np.concatenate([data.covariates[k][name] for k in data.train])
-        if np.ptp(values) > 0.0:
-            out[name] = float(values.min()), float(values.max())
-    return out
-
-
-def _by_term(values: Floats, terms: Sequence[AxisCause]) -> list[Floats]:
-    """Values of all effect columns, and perhaps of others behind them, as those of every term (d,)."""
-    return np.split(values, np.cumsum([len(term.parameters) for term in terms]))[: len(terms)]
-
-
-def _left(
-    data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, *, small: bool = True
-) -> tuple[list[Floats], list[Floats], dict[str, Floats]]:
-    """Residuals (n,) per run, amplitudes of all terms, and healthy sizes by kind.
-
-    small: whether causes that do not act have the small errors of a healthy machine.
-    """
+def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit, sd: float) -> ChannelFit:
     found, model = linear.found, linear.model
-    mean = model.posterior(found.background, found.data.slab(found.members)).mean
-    sizes = {kind: unit * mean[model.layout.covariates[kind]] for kind, unit in linear.unit.items()}
-    errors = _by_term(small * mean, terms)
-    amount = [a if i in found.members else errors[i] for i, a in enumerate(_by_term(found.amplitudes()[0], terms))]
-    left = []
-    for k, y in enumerate(data.values):
-        part = data.response(k, [(t, a) for t, a in zip(terms, amount, strict=True) if a.any()])
-        left.append(y - part - sum((data.healthy[k][kind] @ sizes[kind] for kind in sizes), np.zeros(len(y))))
-    return left, amount, sizes
-
-
-def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: float) -> ChannelFit:
-    found, model = linear.found, linear.model
-    deviation = _by_term(np.sqrt(np.diag(found.amplitudes()[1])), terms)
+    deviation = by_term(np.sqrt(np.diag(found.amplitudes()[1])), terms)
     at = model.posterior(found.background, found.data.slab(found.members))
     slots = {kind: np.arange(model.layout.size)[model.layout.covariates[kind]] for kind in linear.unit}
     every, units = np.concatenate([*slots.values()]), np.concatenate([*linear.unit.values()])
     among = at.covariance(every.tolist()) * np.outer(units, units)
-    left, amount, sizes = _left(data, terms, linear)
+    left, amount, sizes = residuals(data, terms, linear)
     spreads = _spreads_of_shapes(data, terms, linear, amount, sd)
     scale = calibration_of("axes")
     causes, acting, imitated, train = [], [], [], [left[k] for k in data.train]
@@ -433,7 +233,7 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
 
 
 def _no_imitation(
-    data: ChannelData, linear: _Linear, i: int, *, effect: Floats, left: Floats, gains: Mapping[str, float], sd: float
+    data: ChannelData, linear: LinearFit, i: int, *, effect: Floats, left: Floats, gains: Mapping[str, float], sd: float
 ) -> float:
     """Probability of a member with an effect (n,), where the excess of the residual (n,) over the floor is unmodelled for
     certain.
@@ -451,11 +251,11 @@ def _functions(data: ChannelData) -> dict[str, Floats]:
     """Functions (n, q) of every covariate in the rows of the fitted runs."""
     return {
         name: np.concatenate([smooth_functions(data.covariates[k][name], *ends) for k in data.train])
-        for name, ends in _ends(data).items()
+        for name, ends in covariate_ranges(data).items()
     }
 
 
-def _design(linear: _Linear, without: int | None = None) -> Floats:
+def _design(linear: LinearFit, without: int | None = None) -> Floats:
     """Columns (n, k) of the causes that act, but for one, and of healthy sizes, in all rows that were fitted, per standard
     deviation of their amplitudes before the data.
     """
@@ -468,7 +268,7 @@ def _design(linear: _Linear, without: int | None = None) -> Floats:
 
 
 def _gains_of_functions(
-    data: ChannelData, linear: _Linear, left: Sequence[Floats], sd: float
+    data: ChannelData, linear: LinearFit, left: Sequence[Floats], sd: float
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Log Bayes factor of a function of every covariate for the residual (n,), priors included, and the same where the
     noise is what these functions leave.
@@ -487,7 +287,7 @@ def _gains_of_functions(
     return out[0], out[1]
 
 
-def _share_of(linear: _Linear, name: str, left: Sequence[Floats], sd: float) -> float:
+def _share_of(linear: LinearFit, name: str, left: Sequence[Floats], sd: float) -> float:
     """Share of the energy of residuals (n,) that functions of a covariate take."""
     B = np.concatenate([g.B[name][:, 0, :] for g in linear.model.groups]) / sd
     y = np.concatenate(list(left))
@@ -521,14 +321,14 @@ def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[
 
 
 def _spreads_of_shapes(
-    data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, amount: Sequence[Floats], sd: float
+    data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit, amount: Sequence[Floats], sd: float
 ) -> dict[int, dict[str, float]]:
     """Standard deviations of logarithms of shapes by term; a length is not known better than the positions of rows."""
     members = linear.found.members
-    names = _scanned(terms, members)
+    names = scanned(terms, members)
     out: dict[int, dict[str, float]] = {}
     if names:
-        _, spread = _jointly(data, terms, members, amount, sd, settings=True)
+        _, spread = jointly(data, terms, members, amount, sd, settings=True)
         first = sum(len(amount[i]) for i in members)
         for (i, name), own in zip(names, spread[first:].tolist(), strict=False):
             length = any(p.name == name and p.unit in ("mm", "rad") for p in terms[i].module.PARAMETERS)

@@ -18,11 +18,12 @@ import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.channel_data import BETWEEN, BODIES, TURNING, ChannelData, base_of, healthy_sizes
-from camcomp.diagnosis.axis.channel_fit import CAUSES, ChannelFit, fit_channel
+from camcomp.diagnosis.axis.channel_fit import ChannelFit, fit_channel
 from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, DrivenAxis, candidates
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun, ChannelRun
 from camcomp.diagnosis.axis.gate import WITHIN, AxisGate, judge, not_known
+from camcomp.diagnosis.axis.linear_sets import CAUSES
 from camcomp.diagnosis.axis.row_noise import log_gain
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.axis.terms import TURNS_MM_PER_S, AxisTravel, ripple
