@@ -185,7 +185,8 @@ def _healthy(
         elif rows.channel == "following":
             own["friction"] = np.stack([m.reversal(way) for way in TURNS_MM], axis=1)
         if rows.between:
-            own[BETWEEN] = rows.between[k]
+            straight = len(axes[k].asked.time) == len(rows.runs[k].asked[0])  # no instants between rows
+            own[BETWEEN] = straight * rows.between[k]
         if rows.asymmetric:
             own["asymmetry"] = np.abs(m.speed)[:, None]
         if force:
