@@ -14,7 +14,6 @@ from camcomp.diagnosis.answer.locate import channel_axes, run_gaps
 from camcomp.diagnosis.answer.minor import MOST_LISTED, minor_effects
 from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.fit.bench import Bench, Run
-from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import floor_um, gap_sizes, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
@@ -49,6 +48,7 @@ from camcomp.diagnosis.search.unexplained import worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
+from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance
 from camcomp.ground.datatypes import Floats

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from camcomp.api.diagnosis import diagnose
-from camcomp.diagnosis.fit.cause_sets import misfit
 from camcomp.diagnosis.next_experiment.designed import propose
 from camcomp.diagnosis.search.indistinguishable import classes
-from camcomp.diagnosis.statistics.normal_equations import gram, sum_grams
+from camcomp.diagnosis.statistics.evidence import gram, misfit
+from camcomp.diagnosis.statistics.normal_equations import sum_grams
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from tests.diagnosis.conftest import plan_of
 from tests.validation.orthoglide.cases import EQUAL

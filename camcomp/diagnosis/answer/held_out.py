@@ -6,12 +6,12 @@ import numpy as np
 
 from camcomp.diagnosis.answer.unseen import JudgedRun, unseen_shrinkage
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run
-from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.columns import candidate_columns
 from camcomp.diagnosis.fit.gap import floor_um, main_channels, square_lengths
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.result.types import UnseenShrinkage
+from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause

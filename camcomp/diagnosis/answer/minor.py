@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from camcomp.diagnosis.fit.cause_sets import Fitted, estimate
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.noise import HEALTHY
 from camcomp.diagnosis.result.types import MinorEffect
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.evidence import estimate
 
 MOST_LISTED = 8  # minor effects, or drivers of a gap
 

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.diagnosis.fit.cause_sets import Fitted, parts_of, temperature_of, weighed
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import MOST_SETS
-from camcomp.diagnosis.model.evidence import Members
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, parts_of, temperature_of
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 
@@ -30,8 +29,8 @@ def causes_without(
     temperature = temperature_of(best, problem.prior, problem.member_columns(best.members))
 
     def value(k: int, f: Fitted, members: Members) -> float:
-        evidence = weighed(f.without(k), problem.prior, problem.candidates).evidence((*members, *f.minor))
-        return evidence / temperature + problem.candidates.prior(members, f.minor)
+        scale = Scale(f.without(k), problem.prior, problem.candidates)
+        return scale((*members, *f.minor)) / temperature + problem.candidates.prior(members, f.minor)
 
     out = []
     for k in runs:

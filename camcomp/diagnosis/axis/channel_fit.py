@@ -243,7 +243,7 @@ def _no_imitation(
     return probability_with_unmodelled(
         effect, _design(linear, i), {name: (gains.get(name, 0.0), own) for name, own in _functions(data).items()},
         excess=float(np.sqrt(max(float(np.mean(left**2)) - data.floor**2, 0.0))), floor=data.floor, noise=sd,
-        odds=found.data.log_prior(found.members) - found.data.log_prior(others),
+        odds=found.data.prior(found.members) - found.data.prior(others),
     )  # fmt: skip
 
 

@@ -3,10 +3,11 @@
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import CandidateCause, cause_of
-from camcomp.diagnosis.fit.cause_sets import Fitted, estimate
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics import places
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause

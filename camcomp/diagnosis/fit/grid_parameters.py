@@ -10,6 +10,7 @@ import numpy as np
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, means
 from camcomp.diagnosis.fit.columns import shape_default
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS
 from camcomp.diagnosis.statistics.folds import Folds
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
@@ -17,7 +18,6 @@ from camcomp.model.effect import Parameter
 
 _FINER = 17  # values between the neighbours of the best
 _AT_ONCE = 8  # values of a shape whose columns are made white together
-MOST_SCALES = 3.0  # of an effect: its largest size while shapes are tried
 White = Callable[[int, ByChannel], ByChannel]  # what makes columns of a run white
 
 
@@ -63,7 +63,7 @@ def _gains(
             return None
         white = [whitened(k, each) for k, each in enumerate(columns)]
         G, h = base.alone(white, base.products(white, own))
-        G = G + np.eye(own) / MOST_SCALES**2
+        G = G + np.eye(own) / PRIOR_WIDTHS[-1] ** 2
         gains.append(np.einsum("vp,vp->v", h, np.linalg.solve(G, h[:, :, None])[:, :, 0]))
     return np.concatenate(gains)
 

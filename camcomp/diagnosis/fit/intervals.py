@@ -9,8 +9,9 @@ Source of the second part: sandwich covariance over blocks (Liang, Zeger 1986; N
 
 import numpy as np
 
-from camcomp.diagnosis.fit.cause_sets import FREE, Fitted
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.evidence import FREE
 from camcomp.ground.datatypes import Floats
 
 FORMULA = 0.005  # share of its size by which an effect's formula itself is off: no guide turns round as Dahl wrote

@@ -21,9 +21,9 @@ _BLOCKS = 60
 _JUMPS = 5  # of a leftover, between which an interval is tried
 
 
-def intervals_of(runs: int) -> int:
-    """Number of intervals of so many runs to choose from, against a cause that has to be sought in time."""
-    return runs * comb(_BLOCKS, 2)
+def log_intervals(runs: int) -> float:
+    """Logarithm of the number of intervals of so many runs to choose from, against a cause that has to be sought in time."""
+    return float(np.log(runs * comb(_BLOCKS, 2)))
 
 
 def never_ending(candidate: CandidateCause) -> dict[str, float]:

@@ -2,12 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import prod
 
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, thinned
-from camcomp.diagnosis.fit.cause_sets import CausePrior, estimate
 from camcomp.diagnosis.fit.columns import (
     Columns,
     build,
@@ -18,15 +16,16 @@ from camcomp.diagnosis.fit.columns import (
     shape_default,
 )
 from camcomp.diagnosis.fit.floor import least_noise, measure_floor
-from camcomp.diagnosis.fit.grid_parameters import MOST_SCALES, best_shape, quick_columns, settled_interval
-from camcomp.diagnosis.fit.intervals_in_time import intervals_of, likely_intervals, never_ending
+from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, settled_interval
+from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, log_intervals, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
+from camcomp.diagnosis.statistics.cause_sets import CausePrior
+from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.folds import Folds, Split
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.diagnosis.statistics.normal_equations import sum_grams
@@ -68,13 +67,31 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
 
 
 def cause_prior(columns: Columns) -> CausePrior:
-    """Prior of sets; scanned values of a shape are equally likely, and so are the intervals of what acts for a while."""
-    places = []
-    for i, a in enumerate(columns.candidates):
-        ways = prod(len(p.scan) for p in a.shapes if not p.placed)
-        ways *= intervals_of(len(columns.blocks)) if any(p.placed for p in a.shapes) else 1
-        places.append(PlacedCause(a.name, a.target, tuple(columns.of(i)), ways))
-    return CausePrior(tuple(places))
+    """Prior weights: every effect weighs the same; within an effect one value for all weighs half, or all targets the same.
+
+    Scanned values of a shape are equally likely, and so are the intervals of what acts for a while.
+    """
+    candidates = columns.candidates  # what follows outlives these columns, which are large
+    names = sorted({a.name for a in candidates})
+    weight = []
+    for a in candidates:
+        same = [b for b in candidates if b.name == a.name]
+        common = any(b.target is None for b in same)
+        share = (
+            1.0 / len(same) if not common or len(same) == 1 else (0.5 if a.target is None else 0.5 / (len(same) - 1))
+        )
+        sought = float(sum(np.log(len(p.scan)) for p in a.shapes if not p.placed))
+        sought += log_intervals(len(columns.blocks)) if any(p.placed for p in a.shapes) else 0.0
+        weight.append(np.log(share / len(names)) - sought)
+
+    def exclusive(i: int, j: int) -> bool:
+        a, b = candidates[i], candidates[j]
+        return a.name == b.name and (a.target is None or b.target is None)
+
+    kinds = [tuple(i for i, a in enumerate(candidates) if a.name == name and a.target is not None) for name in names]
+    return CausePrior(
+        tuple(tuple(columns.of(i)) for i in range(len(candidates))), np.array(weight), exclusive, tuple(kinds)
+    )
 
 
 def _with_model_error(problem: Problem) -> Noise:
@@ -115,7 +132,7 @@ def _scanned(problem: Problem) -> Problem:
     """
     scanned = [i for i in problem.shapes if problem.columns.candidates[i].shapes]
     own = [c for i in scanned for c in problem.candidates.columns[i]]
-    precision = np.where(problem.columns.candidate >= 0, MOST_SCALES**-2, problem.prior.precision)
+    precision = np.where(problem.columns.candidate >= 0, 1.0 / 9.0, problem.prior.precision)  # three scales
     white = [W.exchanged(own, np.zeros((len(W), len(own)))) for W in problem.white]
     base = Folds(
         white=white, residual=problem.white_residual, precision=precision, constants=[], split=Split(1, 1),
@@ -140,11 +157,11 @@ def _scanned(problem: Problem) -> Problem:
         columns = candidate_columns(problem.bench, candidate, best)
         changed.append((list(problem.candidates.columns[i]), columns))
     blocks, whole = list(problem.columns.blocks), list(problem.white)
-    prior = replace(problem.prior, tolerance=problem.prior.tolerance.copy(), unit=problem.prior.unit.copy())
+    prior = replace(problem.prior, tolerance=problem.prior.tolerance.copy())
     for index, columns in changed:
         candidate = problem.columns.candidates[problem.columns.candidate[index[0]]]
         for c, p, per_run in zip(index, candidate.parameters, columns, strict=True):
-            prior.tolerance[c], prior.unit[c] = healthy_size(problem.bench, candidate, p, per_run, problem.floor.tip_um)
+            prior.tolerance[c] = healthy_size(problem.bench, candidate, p, per_run, problem.floor.tip_um)
         for k in range(len(blocks)):
             new = np.stack([each[k] for each in columns], axis=2)
             blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))

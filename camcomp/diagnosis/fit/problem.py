@@ -7,18 +7,18 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, cause_of, step_of
-from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, Prior, estimate, weighed
 from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
 from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
 from camcomp.diagnosis.fit.patterns import KINDS, Dictionary
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.model.discrepancy import ROWS_OF_PROCESS
-from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale
+from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
-from camcomp.diagnosis.statistics.normal_equations import NormalEquations, gram, sum_grams
+from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.errors import PhysicsError
@@ -198,11 +198,11 @@ class Problem:
         if len(pushed := np.flatnonzero(farther > 1.0)):
             both = [np.column_stack([own, self._pushed(k, farther)]) for k, own in enumerate(white)]
             grams = self._grams_at([*index, *pushed], both, left)
-        sets = weighed(sum_grams(grams), self.prior, self.candidates)
+        scale = Scale(sum_grams(grams), self.prior, self.candidates)
         mean, full = estimate(sum_grams(grams), self.prior, index)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
         return Fitted(
-            members=members, theta=theta, covariance=covariance, log_evidence=sets.evidence(members), grams=grams,
+            members=members, theta=theta, covariance=covariance, log_evidence=scale(members), grams=grams,
             extra=shapes, white=tuple(white), residual=tuple(left), farther=farther,
         )  # fmt: skip
 

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.fit.cause_sets import FREE, Fitted, Prior, temperature_of, weighed
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import TermBench, spots
 from camcomp.diagnosis.law.describe import law_result, moved_without
 from camcomp.diagnosis.law.find import BETTER, FoundLaw, find_law, find_map
 from camcomp.diagnosis.law.screen import term_grids
-from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.result.types import Law
 from camcomp.diagnosis.search.unknown import firm_prior
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, temperature_of
+from camcomp.diagnosis.statistics.evidence import FREE, Prior
 from camcomp.diagnosis.statistics.folds import Folds, Split, usual_split
 from camcomp.ground.datatypes import Floats
 
@@ -158,7 +158,6 @@ def with_law(problem: Problem, bench: TermBench, found: FoundLaw) -> Problem:
     prior = Prior(
         np.concatenate([old.tolerance, found.precision**-0.5]),
         np.concatenate([old.sign, np.zeros(more)]),
-        np.concatenate([old.unit, np.ones(more)]),
     )
     values = [bench.values(t.spot, t.form) for t in found.terms]
     blocks = tuple(
@@ -183,14 +182,10 @@ def fit_needed(problem: Problem, members: Members) -> Fitted:
     while members:
         f = problem.refit(members)
         smaller = [tuple(each for each in members if each != i) for i in members]
-        sets = weighed(f.data, problem.prior, problem.candidates)
+        scale, prior = Scale(f.data, problem.prior, problem.candidates), problem.candidates.prior
         temperature = temperature_of(f, problem.prior, problem.member_columns(f.members))
-        odds = [
-            (sets.evidence(members) - sets.evidence(less)) / temperature
-            + sets.log_prior(members)
-            - sets.log_prior(less)
-            for less in smaller
-        ]
+        whole = scale(members)
+        odds = [(whole - scale(less)) / temperature + prior(members) - prior(less) for less in smaller]
         small = problem.small_members(f)
         if min(odds) < 0.0:
             members = smaller[int(np.argmin(odds))]

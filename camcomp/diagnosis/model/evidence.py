@@ -9,14 +9,13 @@ Source: George, McCulloch, Statistica Sinica 7 (1997) 339; half-normal slabs whe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import comb, log
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.linalg.lapack import dpotri
 from scipy.special import log_ndtr
 
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
@@ -27,10 +26,10 @@ from camcomp.diagnosis.model.group import (
     normal_equations,
 )
 from camcomp.diagnosis.model.noise import HEALTHY
+from camcomp.diagnosis.statistics.cause_sets import SIZES
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
 from camcomp.ground.datatypes import Floats, Ints
 
-SIZES = (0.45, 0.33, 0.13, 0.055, 0.022, 0.009, 0.004)  # prior probability of 0, 1, 2 ... causes
 WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: effect of a cause on the channels
 LONG = 20  # columns: a longer candidate has no small errors
 FREE = 1e-6  # precision of nuisances in units of their columns
@@ -211,16 +210,8 @@ class LinearModel:
             own, by = at.without(effects)
             gram, moment = np.zeros((k, k)), np.zeros(k)
             gram[np.ix_(effects, effects)], moment[effects] = own, by
-            self._reduced[background] = Reduced(
-                gram=gram, moment=moment, none=at.log_evidence, candidates=self.candidates, bounds=self.bounds,
-                units=[self.unit(np.array(c.columns, int)) for c in self.candidates], log_prior=self.log_prior,
-            )  # fmt: skip
+            self._reduced[background] = Reduced(self, gram, moment, at.log_evidence)
         return self._reduced[background]
-
-    def log_prior(self, members: Members) -> float:
-        """Log prior of a set: its number of causes, places equally likely, shapes of a place equally likely."""
-        places, ways = len({c.place for c in self.candidates}), sum(log(self.candidates[i].ways) for i in members)
-        return log(SIZES[len(members)]) - log(comb(places, len(members))) - ways
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -255,14 +246,10 @@ class AmplitudePosterior:
     def covariance(self, columns: Sequence[int]) -> Floats:
         """Covariance (d, d) of some of the live columns."""
         at = np.searchsorted(self.live, columns)
-        return np.asarray(self._inverse[np.ix_(at, at)])
-
-    @cached_property
-    def _inverse(self) -> Floats:
-        """Covariance of all live columns."""
-        triangle = np.tril(dpotri(self.factor[0], lower=1)[0])
-        whole = triangle + np.tril(triangle, -1).T
-        return np.asarray(self.scale[:, None] * whole * self.scale)
+        right = np.zeros((len(self.live), len(at)))
+        right[at, np.arange(len(at))] = 1.0
+        own = cho_solve(self.factor, right)[at]
+        return np.asarray(self.scale[at][:, None] * own * self.scale[at], float)
 
     def without(self, columns: Ints) -> tuple[Floats, Floats]:
         """Normal equations (d, d), (d,) of further columns with all live ones integrated out."""
@@ -285,51 +272,57 @@ class AmplitudePosterior:
         return out
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Reduced:
-    """Normal equations of the effects (gram (k, k), moment (k,)), and the log evidence of no cause at all.
+    """Normal equations of the effects (gram (k, k), moment (k,)), and the log evidence of no cause at all."""
 
-    units: per candidate amplitudes (d,) at which it acts by one floor, its columns in equal parts, 0 where one is not seen.
-    log_prior: of a set.
-    """
-
+    model: LinearModel
     gram: Floats
     moment: Floats
     none: float
-    candidates: Sequence[PlacedCause]
-    units: Sequence[Floats]
-    bounds: AmplitudeBounds
-    log_prior: Callable[[Members], float]
+
+    @cached_property
+    def _unit(self) -> list[Floats]:
+        """Amplitudes (d,) of every candidate at which it acts by one floor, its columns in equal parts."""
+        return [self.model.unit(np.array(c.columns, int)) for c in self.model.candidates]
+
+    @cached_property
+    def _places(self) -> int:
+        return len({c.place for c in self.model.candidates})
+
+    @property
+    def candidates(self) -> Sequence[PlacedCause]:
+        """All candidates."""
+        return self.model.candidates
 
     @property
     def usable(self) -> list[int]:
         """Candidates all of whose columns are seen."""
-        return [i for i, unit in enumerate(self.units) if unit.all()]
+        return [i for i, unit in enumerate(self._unit) if unit.all()]
 
-    def units_of(self, members: Members) -> Floats:
+    def units(self, members: Members) -> Floats:
         """Amplitudes (d,) at which every member acts by one floor."""
-        return np.concatenate([np.zeros(0), *(self.units[i] for i in members)])
+        return np.concatenate([np.zeros(0), *(self._unit[i] for i in members)])
 
     def indices(self, members: Members) -> list[int]:
         """Columns of members, one after the other."""
-        return [j for i in members for j in self.candidates[i].columns]
+        return [j for i in members for j in self.model.candidates[i].columns]
 
-    def evidence(self, members: Members) -> float:
-        """Log evidence of a set."""
-        return float(self._evidence(members[:-1], members[-1:])[0]) if members else self.none
+    def prior(self, members: Members) -> float:
+        """Log prior of a set: its number of causes, places equally likely, shapes of a place equally likely."""
+        ways = sum(log(self.model.candidates[i].ways) for i in members)
+        return log(SIZES[len(members)]) - log(comb(self._places, len(members))) - ways
 
     def value(self, members: Members) -> float:
         """Log posterior of a set up to a constant, evidence and prior."""
-        return self.evidence(members) + self.log_prior(members)
+        if not members:
+            return self.none + self.prior(())
+        return float(self.with_one_more(members[:-1], members[-1:])[0])
 
     def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
         """Log posterior (s,) of a set with one candidate more each, up to a constant."""
-        return self._evidence(members, more) + [self.log_prior((*members, i)) for i in more]
-
-    def _evidence(self, members: Members, more: Sequence[int]) -> Floats:
-        """Log evidence (s,) of a set with one candidate more each."""
-        out = np.full(len(more), self.none)
-        count = np.array([len(self.candidates[i].columns) for i in more])
+        out = np.array([self.none + self.prior((*members, i)) for i in more])
+        count = np.array([len(self.model.candidates[i].columns) for i in more])
         for d in np.unique(count):
             own = np.flatnonzero(count == d)
             value = self._posterior(members, [more[i] for i in own.tolist()])[0]
@@ -343,7 +336,7 @@ class Reduced:
         """Amplitudes (d,), covariance (d, d) and the most probable width, small errors integrated out."""
         value, mean = self._posterior(members[:-1], members[-1:])
         w = int(np.argmax(value[0]))
-        on, unit = self.indices(members), self.units_of(members)
+        on, unit = self.indices(members), self.units(members)
         M = unit[:, None] * self.gram[np.ix_(on, on)] * unit + np.eye(len(on)) / WIDTHS[w] ** 2
         return mean[0, w], unit[:, None] * np.linalg.inv(M) * unit, WIDTHS[w]
 
@@ -352,26 +345,45 @@ class Reduced:
         if not members:
             return {}
         width = self.estimate(members)[2]
-        return dict(zip(self.indices(members), (width * self.units_of(members)).tolist(), strict=True))
+        return dict(zip(self.indices(members), (width * self.units(members)).tolist(), strict=True))
 
     def _posterior(self, members: Members, more: Sequence[int]) -> tuple[Floats, Floats]:
-        """Log evidence (s, widths) and amplitudes (s, widths, d) of a set with one of s candidates more, each of e columns."""
-        old = np.array(self.indices(members), int)
-        on = np.array([[*old, *self.candidates[i].columns] for i in more])
-        unit = np.array([[*self.units_of(members), *self.units[i]] for i in more])
+        """Log evidence (s, widths) and amplitudes (s, widths, d) of a set with one of s candidates more, each of e columns.
+
+        The columns of the set are eliminated once.
+        """
+        old, new = np.array(self.indices(members), int), np.array([self.model.candidates[i].columns for i in more])
+        a, b = self.units(members), np.array([self._unit[i] for i in more])
         square = np.array(WIDTHS) ** 2
-        G = unit[:, :, None] * self.gram[on[:, :, None], on[:, None]] * unit[:, None]
-        M, h = G[:, None] + np.eye(on.shape[1]) / square[:, None, None], (unit * self.moment[on])[:, None]
-        C = np.linalg.inv(M)
-        mean = (C @ h[..., None])[..., 0]
-        value = 0.5 * (h * mean).sum(axis=2) - 0.5 * (np.linalg.slogdet(M)[1] + on.shape[1] * np.log(square))
-        sd = np.sqrt(np.maximum(np.diagonal(C, axis1=2, axis2=3), 0.0))
-        mean, sd, on = unit[:, None] * mean, unit[:, None] * sd, on[:, None]
+        A = a[:, None] * self.gram[np.ix_(old, old)] * a + np.eye(len(a)) / square[:, None, None]  # (widths, o, o)
+        B = a[:, None] * self.gram[old[:, None], new[:, None, :]] * b[:, None, :]  # (s, o, e)
+        C = b[:, :, None] * self.gram[new[:, :, None], new[:, None, :]] * b[:, None, :]
+        P = np.linalg.inv(A)
+        alone = P @ (a * self.moment[old])  # (widths, o)
+        taken = np.einsum("wop,spe->swoe", P, B, optimize=True)
+        S = C[:, None] + np.eye(b.shape[1]) / square[:, None, None]
+        S = S - np.einsum("soe,swof->swef", B, taken, optimize=True)
+        Q = np.linalg.inv(S)
+        left = (b * self.moment[new])[:, None] - np.einsum("soe,wo->swe", B, alone, optimize=True)
+        gained = (Q @ left[..., None])[..., 0]
+        value = 0.5 * ((alone @ (a * self.moment[old]))[None] + (left * gained).sum(axis=2))
+        value -= 0.5 * (np.linalg.slogdet(A)[1] + np.linalg.slogdet(S)[1] + (len(a) + b.shape[1]) * np.log(square))
+        mean = np.concatenate([alone[None] - (taken @ gained[..., None])[..., 0], gained], axis=2)
+        variance = np.concatenate(
+            [
+                np.diagonal(P, axis1=1, axis2=2)[None] + ((taken @ Q) * taken).sum(axis=3),
+                np.diagonal(Q, axis1=2, axis2=3),
+            ],
+            axis=2,
+        )
+        on = np.concatenate([np.broadcast_to(old, (len(new), len(old))), new], axis=1)[:, None, :]
+        unit = np.concatenate([np.broadcast_to(a, (len(b), len(a))), b], axis=1)[:, None, :]
+        mean, sd = unit * mean, unit * np.sqrt(np.maximum(variance, 0.0))
         return value + self._inside(mean, sd, on), mean
 
     def _inside(self, mean: Floats, sd: Floats, on: np.ndarray) -> Floats:
         """Log share (s, widths) of the posterior that has the right signs; minus infinity far outside of the bounds."""
-        bounds = self.bounds
+        bounds = self.model.bounds
         signed = bounds.sign[on] > 0.0
         share = log_ndtr(np.where(signed, mean / np.maximum(sd, 1e-300), 0.0)) + log(2.0)
         out = np.where(signed, share, 0.0).sum(axis=2)

@@ -24,10 +24,11 @@ REGIONS = 16  # of positions or time, between which squares are compared
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Residuals (n, c) of a fold in channel units: rows of the model's group g; squares (n,) of values of size 1."""
+    """Residuals of a fold: rows of the model's group g; near (n, c) in channel units; squares (n,) of values of size 1."""
 
     group: int
     left: Floats
+    near: Floats
     squares: Floats
 
 
@@ -80,7 +81,7 @@ def held_out(
         squares = product.sum(axis=1) * values / max(values - free, 1)
         if alone:
             left = without_nuisances(left, group.N)
-        out.append(HeldOut(g, left, squares))
+        out.append(HeldOut(g, left, near, squares))
     return out
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations, product
+from typing import Protocol
 
 import numpy as np
 
-from camcomp.diagnosis.model.candidates import Place
-from camcomp.diagnosis.model.evidence import LONG, Members, Reduced
+from camcomp.diagnosis.model.candidates import Place, PlacedCause
+from camcomp.diagnosis.model.evidence import LONG, Members
+from camcomp.ground.datatypes import Floats
 
 MOST = 5  # causes of a set
 ROUNDS = 6  # of searches about what was found, at most
@@ -28,7 +30,25 @@ def sets_of_places(places: Sequence[Place], most: int) -> list[Members]:
     return [tuple(sorted(each)) for own in some for each in product(*own)]
 
 
-def search_sets(data: Reduced, most: int = MOST) -> dict[Members, float]:
+class WeighedSets(Protocol):
+    """Log posteriors of sets of candidates, of which those `usable` may be members."""
+
+    @property
+    def candidates(self) -> Sequence[PlacedCause]:
+        """All candidates."""
+
+    @property
+    def usable(self) -> Sequence[int]:
+        """Candidates that the data can show."""
+
+    def value(self, members: Members) -> float:
+        """Log posterior of a set, up to a constant."""
+
+    def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
+        """Log posterior (m,) of a set with one of `more` each."""
+
+
+def search_sets(data: WeighedSets, most: int = MOST) -> dict[Members, float]:
     """Sets of up to `most` causes with their log posteriors.
 
     A set has at most one candidate of more than LONG columns, which is tried with the best set of each size.

@@ -11,7 +11,6 @@ from itertools import islice
 
 import numpy as np
 
-from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.next_experiment.candidates import (
     Candidate,
@@ -24,6 +23,7 @@ from camcomp.diagnosis.next_experiment.predicted_logs import Question, predict_l
 from camcomp.diagnosis.next_experiment.proposal import LEAST_BITS, Proposal, after_unknown
 from camcomp.diagnosis.next_experiment.ready_program import can_be_run
 from camcomp.diagnosis.next_experiment.site import site_of
+from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 from camcomp.model.job import Job
 

@@ -16,11 +16,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import HIDDEN, LARGE
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.predicted_logs import PredictedLogs, Question, seen_apart
+from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.probability import SEED, TEMPERATURE
 from camcomp.ground.datatypes import Floats
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from camcomp.diagnosis.experiment.driven_run import axes_along
 from camcomp.diagnosis.fit.bench import Bench, Run
-from camcomp.diagnosis.fit.cause_sets import Fitted, estimate
 from camcomp.diagnosis.fit.columns import build
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.noise import inflation
@@ -20,6 +19,8 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import HIDDEN, LARGE
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.site import Site, site_of
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import CamcompError

@@ -5,26 +5,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.fit.cause_sets import (
-    Fitted,
-    misfit,
-    probabilities,
-    temperature_of,
-)
 from camcomp.diagnosis.fit.gap import is_at_floor
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
-from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.model.search import ROUNDS
 from camcomp.diagnosis.model.verdict import Word, decide
 from camcomp.diagnosis.search.credible import MODELLED, credibility
 from camcomp.diagnosis.search.fitted_sets import FittedSets
-from camcomp.diagnosis.search.score_test import Shares
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
+from camcomp.diagnosis.statistics.cause_sets import (
+    Fitted,
+    Members,
+    probabilities,
+    temperature_of,
+)
+from camcomp.diagnosis.statistics.evidence import misfit
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
+from camcomp.diagnosis.statistics.score_test import Shares
 from camcomp.ground.datatypes import Floats
 
 LEFT_OPEN = 0.25  # of what causes explain together: no set explains what leaves more, however large its members are
@@ -95,13 +95,13 @@ def search_causes(problem: Problem) -> CauseSearch:
     """Fit sets, rank them, test the best one for an unmodelled effect, and state probabilities."""
     fitted = FittedSets(problem)
     ranked, temperature = _rank_answers(problem, fitted)
-    known, credible, beyond, kind = _keep_causes(problem, ranked.best, fitted)
-    ranked = _with_answer(problem, ranked, known, temperature)
-    stated = _stated(ranked, credible, imitated=kind is not None or bool(above_floor(problem, beyond)))
-    left = residual_tests(problem, known, problem.prior if kind is None else firm_prior(problem))
-    kind = kind if kind is None or kind in left else next(iter(left))
+    kept = _keep_causes(problem, ranked.best, fitted)
+    ranked = _with_answer(problem, ranked, kept.known, temperature)
+    stated = _stated(ranked, kept)
+    left = residual_tests(problem, kept.known, problem.prior if kept.kind is None else firm_prior(problem))
+    kind = kept.kind if kept.kind is None or kept.kind in left else next(iter(left))
     return CauseSearch(
-        sets=ranked, word=_verdict(ranked, stated, kind), stated=stated, left=left, unknown_in=kind, beyond=beyond
+        sets=ranked, word=_verdict(ranked, stated, kind), stated=stated, left=left, unknown_in=kind, beyond=kept.beyond
     )
 
 
@@ -120,17 +120,27 @@ def _rank_answers(problem: Problem, sets: FittedSets) -> tuple[RankedSets, float
     return rank(fits, probability, _same(problem, fits, best)), temperature
 
 
-def _keep_causes(
-    problem: Problem, best: Fitted, sets: FittedSets
-) -> tuple[Fitted, Mapping[int, float], Mapping[str, Unexplained], str | None]:
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """The answer that is kept jointly with an unmodelled effect, the probabilities of its members, and the excess
+    residual on held-out runs.
+
+    kind: of channel in which something unmodelled shows, None where none does. above_floor: whether the excess is above the
+    floor, though no more than what errors of the causes explain.
+    """
+
+    known: Fitted
+    credible: Mapping[int, float]
+    beyond: Mapping[str, Unexplained]
+    kind: str | None
+    above_floor: bool
+
+
+def _keep_causes(problem: Problem, best: Fitted, sets: FittedSets) -> _Kept:
     """Drop members of the best answer, one by one, that an unmodelled effect explains as well.
 
     Where one shows, members that do not predict withheld runs jointly with it are dropped first. What replaces a member
     above the size that counts shows, too.
-
-    Returns:
-        The answer that is kept, the probabilities of its members, the excess residual on held-out runs, and the kind of channel in
-        which something unmodelled shows, None where none does.
     """
     f, beyond = best, unexplained(problem, sets.fit(best.all_members))  # minor effects explain their part, too
     kind = at_first = unknown_kind(problem, best, beyond)
@@ -148,10 +158,10 @@ def _keep_causes(
         beyond = unexplained(problem, f)
         kind = unknown_kind(problem, f, beyond)
     if at_first is None and f.members and is_at_floor(problem, f):
-        return sets.null, {}, beyond, None
+        return _Kept(sets.null, {}, beyond, None, False)
     if kind is None and (at_first or instead):
         kind = worst(beyond).kind
-    return f, present, beyond, kind
+    return _Kept(f, present, beyond, kind, bool(above_floor(problem, beyond)))
 
 
 def _with_answer(problem: Problem, sets: RankedSets, known: Fitted, temperature: float) -> RankedSets:
@@ -163,16 +173,17 @@ def _with_answer(problem: Problem, sets: RankedSets, known: Fitted, temperature:
     return replace(sets, fits=fits, probability=probability, first=0, rivals=())
 
 
-def _stated(sets: RankedSets, credible: Mapping[int, float], *, imitated: bool) -> dict[int, float]:
+def _stated(sets: RankedSets, kept: _Kept) -> dict[int, float]:
     """Calibrated probability of every candidate: that all sets have it and that nothing unmodelled imitates it.
 
-    imitated: whether withheld runs exceed the floor, where causes share what the prior of a discrepancy of any form leaves.
+    Where withheld runs exceed the floor causes share what the prior of a discrepancy of any form leaves.
     """
     # the posterior of the sets lacks causes that are seen only jointly with something unmodelled
-    posterior = dict.fromkeys(credible, 1.0) | sets.inclusion
-    posterior = {i: min(p, credible.get(i, 1.0)) for i, p in posterior.items()}
+    posterior = dict.fromkeys(kept.known.members, 1.0) | sets.inclusion
+    posterior = {i: min(p, kept.credible.get(i, 1.0)) for i, p in posterior.items()}
     calibrate = calibration_of("programs").calibrate
-    return {i: calibrate(with_discrepancy(p) if imitated else p) for i, p in posterior.items()}
+    open_to_others = kept.kind is not None or kept.above_floor
+    return {i: calibrate(with_discrepancy(p) if open_to_others else p) for i, p in posterior.items()}
 
 
 def _verdict(sets: RankedSets, stated: Mapping[int, float], kind: str | None) -> Word:
@@ -213,21 +224,24 @@ def _modelled(problem: Problem, f: Fitted) -> float:
     return min(MODELLED * max(together, *alone, 0.0), LEFT_OPEN * together)
 
 
-def _same(problem: Problem, fits: Sequence[Fitted], best: Fitted) -> list[Members]:
-    """Sets of the size of the best one that fit as well, whatever the prior says of them, of their sizes and of how many
-    parameters they have.
+def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[Members]:
+    """Sets of the size of the best one that fit as well, whatever the priors say of them.
+
+    Priors of sizes, and of how far off the tolerances are all together: the rows and the stated tolerances have to tell.
     """
+    found = []
 
     def left(f: Fitted) -> float:
         return misfit(f.data, problem.prior, problem.member_columns(f.members))
 
     def of_their_signs(f: Fitted) -> bool:
-        sign = problem.prior.sign[problem.member_columns(f.members)]
-        return bool(np.all((sign == 0.0) | (f.theta > 0.0)))
+        parameters = [p for i in f.members for p in problem.columns.candidates[i].parameters]
+        return all(p.sign == 0 or t > 0 for t, p in zip(f.theta, parameters, strict=True))
 
-    others = [f for f in fits if f is not best and len(f.members) == len(best.members) and best.members]
-    return [
-        f.members
-        for f in others
-        if of_their_signs(f) and min(0.5 * (left(f) - left(best)), best.log_evidence - f.log_evidence) < EQUAL_LOG_ODDS
-    ]
+    for f in fits:
+        if f is best or len(f.members) != len(best.members) or not best.members:
+            continue
+        behind = 0.5 * (left(f) - left(best))
+        if min(behind, best.log_evidence - f.log_evidence) < EQUAL_LOG_ODDS and of_their_signs(f):
+            found.append(f.members)
+    return found

@@ -21,16 +21,16 @@ from math import log
 import numpy as np
 from scipy.special import logsumexp
 
-from camcomp.diagnosis.fit.cause_sets import Fitted, parts_of, weighed
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.discrepancy import UNKNOWN, gains_at_scales
-from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.noise import MINOR
-from camcomp.diagnosis.search.score_test import JointProducts
 from camcomp.diagnosis.search.unknown import joint_products, process_in_time
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, parts_of
+from camcomp.diagnosis.statistics.evidence import base, log_bayes
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.diagnosis.statistics.probability import TEMPERATURE
+from camcomp.diagnosis.statistics.score_test import JointProducts
 from camcomp.ground.datatypes import Floats, Ints
 
 MODELLED = 0.1  # of what causes explain: none is modelled better than that
@@ -46,7 +46,7 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool) -> tuple[dict[int,
         return {}, {}
     weight = _weights(problem)
     joint = joint_products(problem, f, weight)
-    alone = _alone(problem, f, joint.columns, log(1.0 - UNKNOWN))
+    alone = _alone(problem, f, joint.data, log(1.0 - UNKNOWN))
     kinds = [_with_covariates(problem, f, joint, alone)]
     for power in (2.0, 1.0):
         scales = process_in_time(problem, f, weight, power)
@@ -78,10 +78,12 @@ class _Hypothesis:
 
 def _alone(problem: Problem, f: Fitted, data: NormalEquations, prior: float) -> list[_Hypothesis]:
     """Every part of a set by normal equations; prior: log prior of what these hold beside the set."""
-    sets, out = weighed(data, problem.prior, problem.candidates), []
+    at, columns = base(data, problem.prior), problem.candidates.columns
+    out = []
     for some in parts_of(f.members):
+        value = at.log_evidence + float(log_bayes(at, problem.prior, [[columns[i] for i in some]])[0])
         there = tuple(float(i in some) for i in f.members)
-        out.append(_Hypothesis(sets.evidence(some), problem.candidates.prior(some) + prior, there))
+        out.append(_Hypothesis(value, problem.candidates.prior(some) + prior, there))
     return out
 
 
@@ -98,7 +100,7 @@ def _with_covariates(
         P, h = joint.projected(problem.prior, problem.member_columns(some))
         for g in groups:
             # a scale is the rms of all rows, in units of the noise
-            unit = float(np.sqrt(joint.data.rows / joint.data.A.diagonal()[joint.functions[g]].sum()))
+            unit = float(np.sqrt(joint.rows / np.diag(joint.P)[g].sum()))
             gains, amount = gains_at_scales(P[np.ix_(g, g)], h[g], unit)
             there = tuple(
                 has or float(_is_alike(joint, g, amount, columns[i], each))
@@ -114,14 +116,15 @@ def covariates(joint: JointProducts) -> list[Ints]:
     words = [name.split(":") for name in joint.labels]
     sorts = [list(joint.labels), [word for word, _ in words], [target for _, target in words]]
     found = [np.flatnonzero(np.array(names) == each) for names in sorts for each in dict.fromkeys(names)]
-    return [g for g in found if joint.data.A.diagonal()[joint.functions[g]].any()]
+    return [g for g in found if np.diag(joint.P)[g].any()]
 
 
 def _is_alike(joint: JointProducts, g: Ints, amount: Floats, columns: Members, theta: Floats) -> bool:
     """Whether functions g with amplitudes (q,) do the same as columns (d,) at coordinates theta (d,)."""
-    index, apart, own = [*columns, *joint.functions[g]], np.append(theta, -amount), np.append(theta, 0.0 * amount)
-    A = joint.data.A[np.ix_(index, index)]
-    return bool(apart @ A @ apart < MODELLED**2 * (own @ A @ own))
+    on = np.array(columns)
+    own = float(theta @ joint.data.A[np.ix_(on, on)] @ theta)
+    apart = own - 2.0 * float(theta @ joint.B[np.ix_(on, g)] @ amount) + float(amount @ joint.P[np.ix_(g, g)] @ amount)
+    return apart < MODELLED**2 * own
 
 
 def _weights(problem: Problem) -> list[Floats]:

@@ -6,17 +6,54 @@ the search is repeated about the best fit until it is the same again.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
-from camcomp.diagnosis.fit.cause_sets import Fitted, estimate, weighed
+import numpy as np
+
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.evidence import Members
+from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.search import search_sets
+from camcomp.diagnosis.statistics.cause_sets import (
+    Fitted,
+    Members,
+    Scale,
+    scored,
+)
+from camcomp.diagnosis.statistics.evidence import estimate, freed, log_bayes
+from camcomp.diagnosis.statistics.normal_equations import sum_grams
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground import progress
+from camcomp.ground.datatypes import Floats
 
 TRIED = 5  # sets fitted about a fit that are larger than it, as many of those that are not, and of single causes
 HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSets:
+    """Sets weighed by the evidence linearised about one fit, tolerances as stated; for model/search."""
+
+    scale: Scale
+    usable: Sequence[int]
+    candidates: Sequence[PlacedCause]
+
+    def value(self, members: Members) -> float:
+        """Log evidence plus log prior."""
+        at, columns = self.scale.base, self.scale.candidates.columns
+        causes = [columns[i] for i in members]
+        more = float(log_bayes(at, self.scale.prior, [causes])[0]) if causes else 0.0
+        return at.log_evidence + more + self.scale.candidates.prior(members)
+
+    def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
+        """The same (m,) of a set with one of `more` each, the set's own amplitudes free; -inf where two exclude each other."""
+        scale, known = self.scale, self.scale.candidates
+        own = [c for i in members for c in known.columns[i]]
+        at = freed(scale.base, own) if own else scale.base
+        gains = log_bayes(at, scale.prior, [[known.columns[i]] for i in more])
+        gains += [known.prior(tuple(sorted((*members, i)))) for i in more]
+        gains[[any(known.exclusive(i, j) for j in members) for i in more]] = -np.inf
+        return np.asarray(gains + self.value(members) - known.prior(members), float)
 
 
 class FittedSets:
@@ -24,6 +61,8 @@ class FittedSets:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
+        seen = np.diag(sum_grams(problem.base_grams).A)
+        self.every = [i for i, own in enumerate(problem.candidates.columns) if seen[list(own)].any()]
         self.null = problem.refit(())
         self.done: dict[Members, Fitted] = {(): self.null}
         self.searched = set[Members]()
@@ -43,18 +82,21 @@ class FittedSets:
         """Fit the best sets by the evidence linearised about a fit; about none, the best single causes, too."""
         self.searched.add(near.members)
         problem = self.problem
-        found = search_sets(weighed(near.data, problem.prior, problem.candidates))
-        ranked = sorted(found, key=lambda members: (-found[members], members))
-        larger = [members for members in ranked if len(members) > len(near.members)]
-        others = [members for members in ranked if len(members) <= len(near.members) and members not in self.done]
-        singles = [members for members in ranked if len(members) == 1]
-        best = problem.candidates.value(near)
-        for some in (larger, others):
-            for members in some[:TRIED]:
-                if found[members] > max(best, found[some[0]]) - HOPELESS_LOG:
+        scale = Scale(near.data, problem.prior, problem.candidates)
+        named = zip(problem.columns.candidates, problem.candidates.columns, strict=True)
+        places = [PlacedCause(c.name, c.target, own) for c, own in named]
+        found = search_sets(LinearSets(scale, self.every, places))
+        larger = {members for members in found if len(members) > len(near.members)}
+        for some in (larger, found.keys() - larger - self.done.keys()):
+            first = sorted(some, key=lambda members: (-found[members], members))[: 3 * TRIED]
+            best = problem.candidates.value(near)
+            for value, members in scored(scale, first)[:TRIED]:
+                best = max(best, value)
+                if value > best - HOPELESS_LOG:
                     self.fit(members, near)
-        for members in [] if near.members else singles[:TRIED]:
-            self.fit(members)
+        if not near.members:
+            for _, members in scored(scale, [(i,) for i in self.every])[:TRIED]:
+                self.fit(members)
 
     def answers(self, temperature: float = 1.0) -> list[Fitted]:
         """Sets without small members, the most probable first.

@@ -11,17 +11,16 @@ from itertools import permutations
 import numpy as np
 from scipy.linalg import eigh
 
-from camcomp.diagnosis.fit.cause_sets import FREE, estimate
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import HIDDEN, LARGE
+from camcomp.diagnosis.statistics.evidence import FREE, base
 from camcomp.diagnosis.statistics.normal_equations import sum_grams
 
 
 def classes(problem: Problem) -> list[tuple[int, ...]]:
     """Candidates that share a signature, in groups of two and more."""
     data, candidates = sum_grams(problem.base_grams), problem.candidates
-    (_, covariance), precision = estimate(data, problem.prior, ()), problem.prior.precision
-    columns = candidates.columns
+    within, columns = base(data, problem.prior), candidates.columns
 
     def apart(i: int, free: Sequence[int]) -> float:
         """Distance, in units of the noise, of candidate i at `LARGE` times the noise from the best fit of the candidates `free`.
@@ -29,7 +28,7 @@ def classes(problem: Problem) -> list[tuple[int, ...]]:
         Of its parameters that direction counts which keeps least.
         """
         index, d = [*columns[i], *(c for each in free for c in columns[each])], len(columns[i])
-        known = np.linalg.inv(covariance[np.ix_(index, index)]) - np.diag(precision[index])
+        known = np.linalg.inv(within.covariance[np.ix_(index, index)]) - np.diag(within.precision[index])
         known[d:, d:] += FREE * np.eye(len(index) - d)
         left = known[:d, :d] - known[:d, d:] @ np.linalg.solve(known[d:, d:], known[d:, :d])
         own = data.A[np.ix_(index[:d], index[:d])]

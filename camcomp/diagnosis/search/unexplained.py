@@ -15,11 +15,12 @@ import numpy as np
 from scipy.special import log_ndtr, ndtri
 
 from camcomp.diagnosis.fit.bench import thinned
-from camcomp.diagnosis.fit.cause_sets import Fitted, estimate
 from camcomp.diagnosis.fit.floor import row_scatter
 from camcomp.diagnosis.fit.outliers import TINY
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.diagnosis.statistics.probability import SURELY
 from camcomp.ground.datatypes import Bools, Floats
@@ -87,35 +88,41 @@ def undetermined(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
 
 def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:
     """Excess residual of one kind of channel, from residuals (n, 3) of every run, mm at the tip."""
-    slow, parts = problem.floor.slow_mm if kind == "tip" else 0.0, []
+    slow = problem.floor.slow_mm if kind == "tip" else 0.0
+    excess: list[Floats] = []
+    chance: list[Floats] = []
+    weight: list[Floats] = []
     for k, values in enumerate(at_tip):
+        t = problem.times[k]
         inflate = problem.inflate[k][:, problem.channels_of(kind)]
         if kind != "tip":  # each channel moves the tip along its own way: the worst of them counts
             inflate = np.repeat(np.nanmax(np.nan_to_num(inflate, nan=1.0), axis=1)[:, None], 3, axis=1)
         values = np.where(inflate < 3.0, values, np.nan)
-        noise = np.nan_to_num([row_scatter(x, problem.times[k]) for x in values.T])
+        noise = np.array([row_scatter(x, t) for x in values.T])
+        noise = np.where(np.isfinite(noise), noise, 0.0)
         if kind == "encoder":  # what shakes more than the instrument of the tip is motion
             noise = np.minimum(noise, problem.floor.axis_mm)
-        rows, less = _blocks(values), _blocks(inflate)
-        seen = np.isfinite(rows)
-        count = np.maximum(seen.sum(axis=1), 1)
-        middle = np.nansum(rows, axis=1) / count
-        usual = noise**2 / count + slow**2
-        # rows of which less is known than their noise says (a force that turns between rows) err together
-        allowed = usual + noise**2 * np.where(seen, less**2 - 1.0, 0.0).sum(axis=1) / count
-        each = np.array([middle**2 - allowed, allowed, (usual + TINY) ** 2 / (allowed + TINY) ** 2])
-        parts.append(np.where(seen.sum(axis=1) >= BLOCK // 2, each, 0.0))
-    e, v, w = np.concatenate(parts, axis=1)
+        for a in range(0, len(values), BLOCK):
+            rows = values[a : a + BLOCK]
+            count = np.isfinite(rows).sum(axis=0)
+            enough = count >= BLOCK // 2
+            if not enough.any():
+                continue
+            middle = np.nansum(rows, axis=0) / np.maximum(count, 1)
+            usual = noise**2 / np.maximum(count, 1) + slow**2
+            # rows of which less is known than their noise says (a force that turns between rows) err together
+            more = np.where(np.isfinite(rows), inflate[a : a + BLOCK] ** 2 - 1.0, 0.0).sum(axis=0)
+            allowed = usual + noise**2 * more / np.maximum(count, 1)
+            excess.append(np.where(enough, middle**2 - allowed, 0.0))
+            chance.append(np.where(enough, allowed, 0.0))
+            weight.append(np.where(enough, (usual + TINY) ** 2 / (allowed + TINY) ** 2, 0.0))
+    e, v, w = np.array(excess), np.array(chance), np.array(weight)
+    if not len(e):
+        return Unexplained(kind, 0.0, 0.0)
     whole = np.maximum(w.sum(axis=0), 1.0)
     mean = float((np.sum(w * e, axis=0) / whole).sum())
     doubt = float(np.sqrt(2.0 * np.sum(np.sum((w * v) ** 2, axis=0) / whole**2))) + TINY
     return Unexplained(kind, 1e3 * float(np.sqrt(max(mean, 0.0))), mean / doubt)
-
-
-def _blocks(values: Floats) -> Floats:
-    """Values (n, 3) as (blocks, BLOCK, 3), filled up with NaN."""
-    full = np.pad(values, ((0, -len(values) % BLOCK), (0, 0)), constant_values=np.nan)
-    return full.reshape(-1, BLOCK, values.shape[1])
 
 
 def worst(left: Mapping[str, Unexplained]) -> Unexplained:

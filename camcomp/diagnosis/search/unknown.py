@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import eigh
 
-from camcomp.diagnosis.fit.cause_sets import Fitted, Prior, estimate
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SCALES
-from camcomp.diagnosis.model.evidence import Members
-from camcomp.diagnosis.search.score_test import JointProducts, Shares, score_test
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
+from camcomp.diagnosis.statistics.evidence import Prior, estimate
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
+from camcomp.diagnosis.statistics.score_test import JointProducts, Shares, score_test
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats
 
 
@@ -19,12 +17,6 @@ class NormalEquations:
     c: float
     rows: int
     log_size: float = 0.0
-
-
-def gram(D: Floats | ByChannel, r: Floats) -> NormalEquations:
-    """From white columns D (w, k) and residual r (w,)."""
-    turned: Any = D.T  # of an array or a ByChannel
-    return NormalEquations(turned @ D, turned @ r, float(r @ r), len(r))
 
 
 def sum_grams(grams: Sequence[NormalEquations]) -> NormalEquations:

@@ -5,10 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, probabilities
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.search import fitted_sets
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, probabilities
 
 
 def test_small_members_move_the_tip_by_less_than_is_minor():
@@ -17,7 +16,7 @@ def test_small_members_move_the_tip_by_less_than_is_minor():
     assert Problem.small_members(problem, SimpleNamespace(members=(0, 1, 2))) == (0,)
 
 
-FREE = CausePrior(tuple(PlacedCause(str(i), None, (i,)) for i in range(6)))
+FREE = CausePrior(tuple((i,) for i in range(6)), np.log(np.full(6, 1 / 6)), lambda i, j: {i, j} == {1, 5})
 
 
 def fitted(evidence, *members):

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, Prior
-from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.search import credible
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted
+from camcomp.diagnosis.statistics.evidence import Prior
 
 ROWS = 400
 U = np.linspace(0.0, 1.0, ROWS)
@@ -20,8 +20,8 @@ def present(monkeypatch, column, left, *, surely=False):
     """Probability of a cause with a column (n,), and of something unmodelled in its place, given the measured rows (n,)."""
     one = np.ones(1)
     problem = SimpleNamespace(
-        prior=Prior(0.01 * one, 0.0 * one, 0.05 * one), member_columns=list,
-        candidates=CausePrior((PlacedCause("cause", None, (0,), 2.0),)), columns=SimpleNamespace(names=["cause"]),
+        prior=Prior(0.01 * one, 0.0 * one), member_columns=list,
+        candidates=CausePrior(((0,),), np.log(0.5 * one), lambda i, j: True), columns=SimpleNamespace(names=["cause"]),
         dictionary=SimpleNamespace(kinds=["tip"] * 3, labels=["place:x"] * 3), white_patterns=[ByChannel.of([COVARIATE])],
         white_at=lambda _: [ByChannel.of([column[:, None]])], row_places=lambda _: TIME,
         row_cells=lambda _: (np.zeros(ROWS, int), np.arange(ROWS)), kind_of=lambda _: "tip",

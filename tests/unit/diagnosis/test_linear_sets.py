@@ -3,25 +3,23 @@
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.fit.cause_sets import CausePrior, Prior, weighed
 from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.search import best_of, search_sets
-from camcomp.diagnosis.statistics.normal_equations import gram
+from camcomp.diagnosis.search.fitted_sets import LinearSets
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale, scored
+from camcomp.diagnosis.statistics.evidence import Prior, gram
 
-FORCE, WEIGHT, LENGTH, TWO = 4, 5, 6, 7  # 0 to 3 are springs
+SPRINGS, FORCE, WEIGHT, LENGTH, TWO = (0, 1, 2, 3), 4, 5, 6, 7
+COLUMNS = (*((i,) for i in range(7)), (7, 8))
 TRUTH = (0, 1, FORCE)
 
 
 def sets(D, r, excluded=2):
     """Sets of the columns D (n, 9) that explain r (n,); a candidate excludes that of two columns."""
-    prior = Prior(np.full(9, 1e-3), np.zeros(9), np.full(9, 0.02))
-    names = ["spring" if i < 4 else str(i) for i in range(8)]
-    names[excluded] = names[TWO] = "excluded"
-    places = [
-        PlacedCause(name, str(i) if name == "spring" or i == excluded else None, (7, 8) if i == TWO else (i,))
-        for i, name in enumerate(names)
-    ]
-    return weighed(gram(D, r), prior, CausePrior(tuple(places)))
+    prior = Prior(np.full(9, 1e-3), np.zeros(9))
+    known = CausePrior(COLUMNS, np.full(8, -np.log(8.0)), lambda i, j: {i, j} == {excluded, TWO}, (SPRINGS,))
+    places = [PlacedCause(str(i), None, own) for i, own in enumerate(COLUMNS)]
+    return LinearSets(Scale(gram(D, r), prior, known), range(8), places)
 
 
 def drawn(seed):
@@ -35,6 +33,7 @@ def test_springs_and_force_are_found_though_two_that_undo_one_another_do_nearly_
     D[:, WEIGHT] = wrong + D[:, LENGTH] + 0.15 * D[:, WEIGHT]
     data = sets(D, wrong + noise)
     assert best_of(search_sets(data)) == TRUTH
+    assert scored(data.scale, [(WEIGHT, LENGTH), TRUTH])[0][1] == TRUTH
 
 
 def test_a_cause_of_two_columns_is_found_and_never_jointly_with_one_that_it_excludes():

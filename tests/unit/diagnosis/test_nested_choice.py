@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.answer.nested import causes_without
-from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, Prior, estimate, probabilities, weighed
-from camcomp.diagnosis.model.candidates import PlacedCause
-from camcomp.diagnosis.statistics.normal_equations import gram, sum_grams
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Scale, probabilities
+from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
+from camcomp.diagnosis.statistics.normal_equations import sum_grams
 
 
 class Told(SimpleNamespace):
@@ -38,13 +38,13 @@ def experiment(sizes, weights, *, only_last=False):
         D[:, 1] = 0.3 * D[:, 0] + D[:, 1] if last else D[:, 0] + 0.02 * D[:, 1]
         D[:, :2] *= last or not only_last
         runs.append(gram(D, D @ sizes + rng.standard_normal(200)))
-    prior = Prior(np.full(3, 1e-3), np.zeros(3), np.full(3, 0.02))
+    prior = Prior(np.full(3, 1e-3), np.zeros(3))
     problem = Told(
         prior=prior,
-        candidates=CausePrior(tuple(PlacedCause(str(i), None, (i,), 1.0 / (3.0 * w)) for i, w in enumerate(weights))),
+        candidates=CausePrior(((0,), (1,), (2,)), np.log(weights), lambda i, j: False),
         bench=SimpleNamespace(runs=[None] * 3),
     )
-    sets = weighed(sum_grams(runs), prior, problem.candidates)
+    scale = Scale(sum_grams(runs), prior, problem.candidates)
 
     def fit(members):
         theta = estimate(sum_grams(runs), prior, list(members))[0][list(members)]
@@ -52,7 +52,7 @@ def experiment(sizes, weights, *, only_last=False):
             members=members,
             theta=theta,
             covariance=np.eye(len(members)),
-            log_evidence=sets.evidence(members),
+            log_evidence=scale(members),
             grams=tuple(runs),
         )
 

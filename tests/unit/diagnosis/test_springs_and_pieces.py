@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.fit.cause_sets import Fitted, Prior
 from camcomp.diagnosis.fit.intervals import FORMULA, STATED, joint_covariance
 from camcomp.diagnosis.search.unknown import followed
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.evidence import Prior
 
 
 def deviation_of_force(apart, *, log=True):
@@ -20,7 +21,7 @@ def deviation_of_force(apart, *, log=True):
     one = np.ones(2)
     parameter = SimpleNamespace(log=log, scale=0.3)
     problem = SimpleNamespace(
-        prior=Prior(1e-3 * one, 0.0 * one, one),
+        prior=Prior(1e-3 * one, 0.0 * one),
         columns=SimpleNamespace(candidates=[SimpleNamespace(parameters=(parameter,))] * 2, names="ab"),
         candidates=SimpleNamespace(columns=((0,), (1,))),
         member_columns=list, shapes_of=lambda members: [], row_places=lambda k: np.linspace(0.0, 1.0, len(r)),

@@ -7,14 +7,14 @@ with what chance makes of it (Rao's score test), and their evidence at a scale i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
 
-from camcomp.diagnosis.fit.cause_sets import Prior
-from camcomp.diagnosis.model.evidence import AmplitudePosterior
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.normal_equations import NormalEquations, gram, sum_grams
+from camcomp.diagnosis.statistics.evidence import Prior, estimate_precision
+from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.ground.datatypes import Floats, Ints
 
 Shares = tuple[tuple[str, float], ...]  # covariates with the share that each carries alone, largest first
@@ -22,25 +22,18 @@ Shares = tuple[tuple[str, float], ...]  # covariates with the share that each ca
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointProducts:
-    """Normal equations of columns (k) and, behind them, functions of covariates (p); labels, kinds (p,) of the functions.
+    """Products of columns (k), residual and patterns (p): data of the columns, B (k, p), h (p,), P (p, p); labels, kinds (p,).
 
-    data.rows: of white rows, each with the square of its weight.
+    rows: number of white rows, each with the square of its weight.
     """
 
     data: NormalEquations
+    B: Floats
+    h: Floats
+    P: Floats
     labels: tuple[str, ...]
     kinds: tuple[str, ...]
-
-    @property
-    def columns(self) -> NormalEquations:
-        """Those of the columns alone."""
-        k = len(self.data.b) - len(self.labels)
-        return replace(self.data, A=self.data.A[:k, :k], b=self.data.b[:k])
-
-    @property
-    def functions(self) -> Ints:
-        """Indices (p,) of the functions."""
-        return np.arange(len(self.data.b))[len(self.data.b) - len(self.labels) :]
+    rows: float
 
     @staticmethod
     def of(
@@ -48,15 +41,23 @@ class JointProducts:
         kinds: Sequence[str], weight: Sequence[Floats],
     ) -> JointProducts:  # fmt: skip
         """Sum over runs of white columns (w, k), residuals (w,) and patterns (w, p); weight (w,): of the rows."""
-        runs = zip(white, residual, patterns, weight, strict=True)
-        data = sum_grams([gram(ByChannel.joined([W, D]).scaled(w), w * r) for W, r, D, w in runs])
-        rows = round(sum(float((w**2).sum()) for w in weight))
-        return JointProducts(data=replace(data, rows=rows), labels=tuple(labels), kinds=tuple(kinds))
+        k, whole = white[0].width, np.zeros((white[0].width + len(labels) + 1,) * 2)
+        for W, r, D, w in zip(white, residual, patterns, weight, strict=True):
+            own = ByChannel.joined([W, D]).appended(r[:, None]).scaled(w)
+            whole += own.T @ own
+        rows = float(sum((w**2).sum() for w in weight))
+        return JointProducts(
+            data=NormalEquations(whole[:k, :k], whole[:k, -1], float(whole[-1, -1]), round(rows)), B=whole[:k, k:-1], h=whole[k:-1, -1],
+            P=whole[k:-1, k:-1], labels=tuple(labels), kinds=tuple(kinds), rows=rows,
+        )  # fmt: skip
 
     def projected(self, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
-        """Normal equations (p, p), (p,) of the functions with the columns `members` free and all others within tolerance."""
-        precision = np.append(prior.precision_beside(members), np.full(len(self.labels), np.inf))
-        return AmplitudePosterior.of(self.data, precision, np.arange(len(prior.sign))).without(self.functions)
+        """Normal equations (p, p), (p,) of the patterns with the columns `members` free and all others within tolerance."""
+        M = self.data.A + np.diag(estimate_precision(prior, members))
+        size = 1.0 / np.sqrt(np.diag(M))
+        L = cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(M)), lower=True)
+        half = solve_triangular(L, size[:, None] * np.column_stack([self.B, self.data.b]), lower=True)
+        return self.P - half[:, :-1].T @ half[:, :-1], self.h - half[:, :-1].T @ half[:, -1]
 
 
 def score_test(joint: JointProducts, P: Floats, h: Floats) -> dict[str, Shares]:

@@ -1,0 +1,101 @@
+"""Evidence in closed form against the integral itself, and its preferences."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale
+from camcomp.diagnosis.statistics.evidence import (
+    PRIOR_WIDTHS,
+    Prior,
+    base,
+    estimate,
+    freed,
+    gram,
+    log_bayes,
+)
+
+RNG = np.random.default_rng(7)
+
+
+def prior(k, sign=None, tolerance=0.01):
+    every = np.ones(k)
+    return Prior(tolerance * every, 0.0 * every if sign is None else np.array(sign))
+
+
+def data(truth, n=300, k=4, seed=1):
+    rng = np.random.default_rng(seed)
+    D = rng.standard_normal((n, k))
+    return gram(D, D @ np.array(truth) + rng.standard_normal(n))
+
+
+def test_bayes_factor_of_one_cause_is_the_integral_it_stands_for():
+    g, p = data([0.2], k=1), prior(1)
+    a, b = g.A[0, 0], g.b[0]
+
+    def integral(density):
+        return quad(lambda x: np.exp(b * x - 0.5 * a * x * x) * density(x), -3, 3, points=[b / a, 0.0], limit=400)[0]
+
+    weights = [0.2, 0.25, 0.3, 0.25]
+    wide = sum(w * integral(lambda x, s=s: norm.pdf(x, 0, s)) for w, s in zip(weights, PRIOR_WIDTHS, strict=True))
+    narrow = integral(lambda x: norm.pdf(x, 0, 0.01))
+    assert log_bayes(base(g, p), p, [[[0]]])[0] == pytest.approx(np.log(wide / narrow), abs=1e-5)
+
+
+def test_of_two_that_do_the_same_the_one_of_larger_typical_size_is_no_less_likely():
+    """One column for two effects, of which one is typically five times as large: what is seen is 0.5 or 0.1 of it, or less."""
+    for size in (0.5, 0.25, 0.1):
+        g = data([size], n=10_000, k=1)
+        large = replace(g, A=25.0 * g.A, b=5.0 * g.b)
+        same = zip((g, large), (prior(1, tolerance=1e-3), prior(1, tolerance=2e-4)), strict=True)
+        odds = [log_bayes(base(own, p), p, [[[0]]])[0] for own, p in same]
+        assert abs(odds[0] - odds[1]) < 0.4
+
+
+def test_a_cause_of_the_wrong_sign_is_held_against_it():
+    g = data([-0.5], k=1)
+    free, signed = prior(1), prior(1, [1.0])
+    assert log_bayes(base(g, signed), signed, [[[0]]])[0] < log_bayes(base(g, free), free, [[[0]]])[0] - 10
+
+
+def test_sets_at_once_equal_sets_one_by_one():
+    g, p = data([0.3, 0.0, -0.2, 0.05]), prior(4, [0.0, 1.0, 1.0, 1.0])
+    at = [base(g, p), freed(base(g, p), [3])]
+    sets = [[[2]], [[0], [1]], [[0, 2]], [], [[1]], [[0, 1], [2]]]
+    for each in at:
+        one_by_one = [log_bayes(each, p, [causes])[0] for causes in sets]
+        assert log_bayes(each, p, sets) == pytest.approx(one_by_one, abs=1e-8)
+
+
+def test_what_is_within_tolerance_is_no_finding():
+    p = prior(4, tolerance=0.3)
+    assert log_bayes(base(data([0.2, 0, 0, 0]), p), p, [[[0]]])[0] < 1.0
+    assert log_bayes(base(data([2.0, 0, 0, 0]), p), p, [[[0]]])[0] > 5.0
+
+
+def test_the_right_cause_wins_and_its_estimate_covers_the_truth():
+    p = prior(4)
+    candidates = CausePrior(((0,), (1,), (2,), (3,)), np.log(np.full(4, 0.25)), lambda i, j: False)
+    hits = 0
+    for seed in range(20):
+        g = data([0, 0.4, 0, 0], seed=seed)
+        scale = Scale(g, p, candidates)
+        values = {m: scale(m) + candidates.prior(m) for m in [(), (0,), (1,), (2,), (3,), (0, 1)]}
+        assert max(values, key=values.get) == (1,)
+        mean, covariance = estimate(g, p, [1])
+        hits += abs(mean[1] - 0.4) < 1.96 * np.sqrt(covariance[1, 1])
+    assert hits >= 16
+
+
+def test_freed_columns_are_those_of_a_wide_prior():
+    rng = np.random.default_rng(8)
+    D = rng.standard_normal((60, 4))
+    data = gram(D, D @ np.array([0.5, -0.2, 0.1, 0.4]) + rng.standard_normal(60))
+    stated = Prior(np.array([0.1, 0.2, 0.3, 0.1]), np.zeros(4))
+    wide = replace(stated, tolerance=np.array([0.1, 10.0, 0.3, 10.0]))
+    got, wanted = freed(base(data, stated), [1, 3]), base(data, wide)
+    for name in ("mean", "covariance", "precision"):
+        assert getattr(got, name) == pytest.approx(getattr(wanted, name), abs=1e-9)
