@@ -16,7 +16,7 @@ from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
 from camcomp.diagnosis.fit.starts import Nuisance, start_columns
-from camcomp.diagnosis.model.noise import HEALTHY, REPEATABILITY_MM
+from camcomp.diagnosis.model.noise import HEALTHY, MINOR, REPEATABILITY_MM
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground import shelf
@@ -142,7 +142,8 @@ def build(
     """All columns at nominal. Candidates that no channel can see have columns of zeros and stay.
 
     Every healthy machine has a little of everything: what moves the tip by HEALTHY of the noise floor is within tolerance,
-    whatever other channels see of it.
+    whatever other channels see of it; what moves it by more than MINOR of it is a cause. Nuisances reach as many of their
+    tolerances: a healthy one goes beyond once in 5600.
     """
     owner: list[int] = []
     names: list[str] = []
@@ -175,7 +176,7 @@ def build(
         for r in range(len(bench.runs))
     )
     bench.columns.clear()  # they stand in the blocks now
-    prior = Prior(np.array(tolerance), np.array(sign))
+    prior = Prior(np.array(tolerance), np.array(sign), MINOR / HEALTHY * np.array(tolerance))
     return Columns(tuple(candidates), np.array(owner), tuple(names), prior, blocks)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.evidence import FREE
+from camcomp.diagnosis.statistics.evidence import FREE, within
 from camcomp.ground.datatypes import Floats
 
 FORMULA = 0.005  # share of its size by which an effect's formula itself is off: no guide turns round as Dahl wrote
@@ -29,12 +29,15 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
     # a shape that the data do not tell is known to about a third
     reach = np.array([0.3 * f.extra[i][p.name] for i, p in names])
     G = [W.appended(D * reach) for W, D in zip(problem.white_at(f), shapes, strict=True)]
-    precision = np.concatenate([_stated(problem), np.ones(s)])
+    usual, most = _stated(problem, problem.prior.precision, problem.prior.reach.copy())
+    precision = np.concatenate([usual, np.ones(s)])
     precision[index] = FREE
     M = sum((g.T @ g for g in G), np.diag(precision))
     size = 1.0 / np.sqrt(np.diag(M))
     C = size[:, None] * np.linalg.inv(size[:, None] * M * size) * size
-    mean = C @ sum(g.T @ r for g, r in zip(G, f.residual, strict=True))
+    most = np.concatenate([most, np.full(s, np.inf)])
+    most[index] = np.inf
+    mean = within(C @ sum(g.T @ r for g, r in zip(G, f.residual, strict=True)), lambda held: C[:, held], most)[0]
     mine = np.array([*index, *range(k, k + s)], int)
     scatter = np.zeros((len(BLOCKS), d + s))
     for run, (g, r) in enumerate(zip(G, f.residual, strict=True)):
@@ -59,11 +62,12 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
     return np.asarray(out + np.diag(healthy**2 + formula**2), float)
 
 
-def _stated(problem: Problem) -> Floats:
-    """Precision (k,) of all columns, with springs and forces known to STATED of themselves only."""
-    precision = problem.prior.precision
+def _stated(problem: Problem, usual: Floats, most: Floats) -> tuple[Floats, Floats]:
+    """Precision and reach (k,) of all columns, with springs and forces known to STATED of themselves only."""
+    precision, reach = usual.copy(), most.copy()
     for candidate, columns in zip(problem.columns.candidates, problem.candidates.columns, strict=True):
         for p, c in zip(candidate.parameters, columns, strict=True):
             if p.log:
                 precision[c] = min(precision[c], (p.scale / STATED) ** 2)
-    return precision
+                reach[c] = np.inf
+    return precision, reach

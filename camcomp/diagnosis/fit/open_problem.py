@@ -23,6 +23,7 @@ from camcomp.diagnosis.fit.noise import inflation, instrument_noise
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.model.noise import HEALTHY, MINOR
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior
 from camcomp.diagnosis.statistics.evidence import estimate
@@ -157,11 +158,12 @@ def _scanned(problem: Problem) -> Problem:
         columns = candidate_columns(problem.bench, candidate, best)
         changed.append((list(problem.candidates.columns[i]), columns))
     blocks, whole = list(problem.columns.blocks), list(problem.white)
-    prior = replace(problem.prior, tolerance=problem.prior.tolerance.copy())
+    prior = replace(problem.prior, tolerance=problem.prior.tolerance.copy(), reach=problem.prior.reach.copy())
     for index, columns in changed:
         candidate = problem.columns.candidates[problem.columns.candidate[index[0]]]
         for c, p, per_run in zip(index, candidate.parameters, columns, strict=True):
             prior.tolerance[c] = healthy_size(problem.bench, candidate, p, per_run, problem.floor.tip_um)
+            prior.reach[c] = MINOR / HEALTHY * prior.tolerance[c]
         for k in range(len(blocks)):
             new = np.stack([each[k] for each in columns], axis=2)
             blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))

@@ -158,6 +158,7 @@ def with_law(problem: Problem, bench: TermBench, found: FoundLaw) -> Problem:
     prior = Prior(
         np.concatenate([old.tolerance, found.precision**-0.5]),
         np.concatenate([old.sign, np.zeros(more)]),
+        np.concatenate([old.reach, np.full(more, np.inf)]),
     )
     values = [bench.values(t.spot, t.form) for t in found.terms]
     blocks = tuple(

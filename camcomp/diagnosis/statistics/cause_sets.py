@@ -14,6 +14,7 @@ import numpy as np
 from camcomp.diagnosis.statistics.evidence import (
     Prior,
     base,
+    holding_back,
     log_bayes,
     log_sum,
     misfit,
@@ -134,7 +135,7 @@ class Scale:
     def __call__(self, members: Members) -> float:
         """Log evidence of a set."""
         columns = self.candidates.columns
-        none = self.base.log_evidence
+        none = self.base.log_evidence - holding_back(self.base, self.prior, [c for i in members for c in columns[i]])
         if not members:
             return none
         ways = self.candidates.ways(members)

@@ -3,7 +3,10 @@
 The white residual is r = D a + e. Columns D belong to effects, to nuisances and to what every healthy machine has.
 An effect that is a cause has the wide prior of its own size (a mixture of four widths), one that is not has the narrow
 prior of its tolerance: a machine is never exactly its model, and what is within tolerance is no finding. Everything
-but the amplitudes of the causes is integrated out exactly.
+but the amplitudes of the causes is integrated out exactly. A tolerance has an end, its reach: what is farther off is a
+cause by definition, and a set that would need it without naming it pays for holding it back (Laplace's approximation
+of the normal distributions that are cut off there; the mode by active sets, Nocedal and Wright, Numerical
+Optimization, 16.5).
 
 Source: group selection with amplitude mixtures; the half-normal signs follow the priors that the effects state, and the
 widths together are nearly flat in the logarithm of a size, from a hundredth of the typical one to three: a calibrated
@@ -11,7 +14,7 @@ machine has of everything what its calibration could just not see, and of two ca
 size is larger is no less likely for it. Positive parameters enter by the posterior probability of their sign.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -28,6 +31,7 @@ from camcomp.ground.datatypes import Floats, Ints
 PRIOR_WIDTHS = np.array([0.02, 0.1, 0.5, 2.5])
 _WEIGHTS = np.log([0.2, 0.25, 0.3, 0.25])
 FREE = 0.01  # precision of a cause while it is fitted: within 10 scales
+PASSES = 30  # of the search for columns at the end of their reach
 
 
 def log_sum(values: Sequence[float] | Floats) -> float:
@@ -45,10 +49,13 @@ def gram(D: Floats | ByChannel, r: Floats) -> NormalEquations:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """For every column (k,), in units of its typical size: tolerance = narrow size (inf = free nuisance), sign."""
+    """For every column (k,), in units of its typical size: tolerance = narrow size (inf = free nuisance), sign; reach =
+    farthest that it goes without being a cause.
+    """
 
     tolerance: Floats
     sign: Floats
+    reach: Floats
 
     @property
     def precision(self) -> Floats:
@@ -134,9 +141,12 @@ def _choices(count: int, widths: int) -> Ints:
 
 
 def estimate(data: NormalEquations, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
-    """Mean (k,) and covariance (k, k) with the columns `members` free within 10 scales, the others within tolerance."""
+    """Mode (k,) and covariance (k, k) with the columns `members` free within 10 scales, the others within tolerance and reach.
+
+    The covariance is that without the ends of the reaches: never too small.
+    """
     at = base(data, prior, members)
-    return at.mean, at.covariance
+    return within(at.mean, lambda held: at.covariance[:, held], _reach(prior, members))[0], at.covariance
 
 
 def estimate_precision(prior: Prior, members: Sequence[int]) -> Floats:
@@ -149,11 +159,25 @@ def estimate_precision(prior: Prior, members: Sequence[int]) -> Floats:
 def freed(at: Base, members: Sequence[int]) -> Base:
     """The same with the columns `members` free within 10 scales; its log evidence stays that without them."""
     index = list(members)
-    own = at.covariance[:, index]
-    gain = np.linalg.inv(np.diag(1.0 / (FREE - at.precision[index])) + own[index])
+    own, gain = _widened(at, index)
     precision = at.precision.copy()
     precision[index] = FREE
     return Base(at.mean - own @ (gain @ at.mean[index]), at.covariance - own @ gain @ own.T, precision, at.log_evidence)
+
+
+def _widened(at: Base, index: list[int]) -> tuple[Floats, Floats]:
+    """Covariance (k, d) of all columns with some, and the gain (d, d) by which freeing those changes mean and covariance."""
+    own = at.covariance[:, index]
+    gain = np.linalg.inv(np.diag(1.0 / (FREE - at.precision[index])) + own[index])
+    return own, np.asarray(gain, float)
+
+
+def holding_back(at: Base, prior: Prior, members: Sequence[int]) -> float:
+    """Log evidence >= 0 that it costs a set with the columns `members` to keep all others within reach."""
+    index = list(members)
+    own, gain = _widened(at, index)
+    mean = at.mean - own @ (gain @ at.mean[index])
+    return within(mean, lambda held: at.covariance[:, held] - own @ (gain @ own[held].T), _reach(prior, index))[1]
 
 
 def misfit(data: NormalEquations, prior: Prior, members: Sequence[int]) -> float:
@@ -162,3 +186,37 @@ def misfit(data: NormalEquations, prior: Prior, members: Sequence[int]) -> float
     precision = prior.precision
     precision[list(members)] = 0.0
     return float(data.c - 2.0 * data.b @ mean + mean @ data.A @ mean + precision @ mean**2)
+
+
+def _reach(prior: Prior, members: Sequence[int]) -> Floats:
+    """Reach (k,), without end for `members`."""
+    out = prior.reach.copy()
+    out[list(members)] = np.inf
+    return out
+
+
+def within(mean: Floats, columns: Callable[[Ints], Floats], reach: Floats) -> tuple[Floats, float]:
+    """Mode (k,) of a normal distribution that is cut off at +-reach (k,), and by how much its log density is lower there.
+
+    columns: those of its covariance (k, h) that are asked for.
+    Columns that are too far off are held at the end of their reach, all at once; those that would go back by themselves
+    are let go again.
+    """
+    mode, held, side = mean, np.zeros(0, np.int64), np.zeros(0)
+    pull, end = side, reach * (1.0 + 1e-9)
+    for _ in range(PASSES):
+        beyond = np.abs(mode) > end
+        beyond[held] = False
+        far = np.flatnonzero(beyond)
+        loose = pull * side > 0.0
+        if not len(far) and not loose.any():
+            break
+        held = np.concatenate([held[~loose], far])
+        side = np.concatenate([side[~loose], np.sign(mode[far])])
+        ways = columns(held)
+        unit = np.sqrt(np.diag(ways[held]))
+        scaled = ways[held] / unit[:, None] / unit + 1e-12 * np.eye(len(held))
+        pull = np.linalg.solve(scaled, (side * reach[held] - mean[held]) / unit) / unit
+        mode = mean + ways @ pull
+    cost = 0.5 * float(pull @ (side * reach[held] - mean[held])) if len(held) else 0.0
+    return np.asarray(np.clip(mode, -reach, reach)), cost

@@ -17,7 +17,7 @@ def problem_of(twin):
     D[:, 1] = 0.07 * (twin * D[:, 0] + np.sqrt(1.0 - twin**2) * D[:, 1])
     data = gram(D, 0.7 * D[:, 0] + rng.standard_normal(400))
     one = np.ones(2)
-    prior = Prior(1e-3 * one, 0.0 * one)
+    prior = Prior(1e-3 * one, 0.0 * one, np.inf * one)
     candidates = CausePrior(((0,), (1,)), np.log(0.5 * one), lambda i, j: True)
     scale = Scale(data, prior, candidates)
     fits = tuple(

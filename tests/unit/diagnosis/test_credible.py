@@ -20,7 +20,7 @@ def present(monkeypatch, column, left, *, surely=False):
     """Probability of a cause with a column (n,), and of something unmodelled in its place, given the measured rows (n,)."""
     one = np.ones(1)
     problem = SimpleNamespace(
-        prior=Prior(0.01 * one, 0.0 * one), member_columns=list,
+        prior=Prior(0.01 * one, 0.0 * one, np.inf * one), member_columns=list,
         candidates=CausePrior(((0,),), np.log(0.5 * one), lambda i, j: True), columns=SimpleNamespace(names=["cause"]),
         dictionary=SimpleNamespace(kinds=["tip"] * 3, labels=["place:x"] * 3), white_patterns=[ByChannel.of([COVARIATE])],
         white_at=lambda _: [ByChannel.of([column[:, None]])], row_places=lambda _: TIME,

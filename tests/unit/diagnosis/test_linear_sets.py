@@ -16,7 +16,7 @@ TRUTH = (0, 1, FORCE)
 
 def sets(D, r, excluded=2):
     """Sets of the columns D (n, 9) that explain r (n,); a candidate excludes that of two columns."""
-    prior = Prior(np.full(9, 1e-3), np.zeros(9))
+    prior = Prior(np.full(9, 1e-3), np.zeros(9), np.full(9, np.inf))
     known = CausePrior(COLUMNS, np.full(8, -np.log(8.0)), lambda i, j: {i, j} == {excluded, TWO}, (SPRINGS,))
     places = [PlacedCause(str(i), None, own) for i, own in enumerate(COLUMNS)]
     return LinearSets(Scale(gram(D, r), prior, known), range(8), places)

@@ -38,7 +38,7 @@ def experiment(sizes, weights, *, only_last=False):
         D[:, 1] = 0.3 * D[:, 0] + D[:, 1] if last else D[:, 0] + 0.02 * D[:, 1]
         D[:, :2] *= last or not only_last
         runs.append(gram(D, D @ sizes + rng.standard_normal(200)))
-    prior = Prior(np.full(3, 1e-3), np.zeros(3))
+    prior = Prior(np.full(3, 1e-3), np.zeros(3), np.full(3, np.inf))
     problem = Told(
         prior=prior,
         candidates=CausePrior(((0,), (1,), (2,)), np.log(weights), lambda i, j: False),

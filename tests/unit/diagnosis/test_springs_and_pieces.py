@@ -21,7 +21,7 @@ def deviation_of_force(apart, *, log=True):
     one = np.ones(2)
     parameter = SimpleNamespace(log=log, scale=0.3)
     problem = SimpleNamespace(
-        prior=Prior(1e-3 * one, 0.0 * one),
+        prior=Prior(1e-3 * one, 0.0 * one, 4e-3 * one),
         columns=SimpleNamespace(candidates=[SimpleNamespace(parameters=(parameter,))] * 2, names="ab"),
         candidates=SimpleNamespace(columns=((0,), (1,))),
         member_columns=list, shapes_of=lambda members: [], row_places=lambda k: np.linspace(0.0, 1.0, len(r)),

@@ -48,7 +48,7 @@ def test_one_member_exchanged_or_left_out_leads_from_a_set_that_was_put_together
     rng = np.random.default_rng(5)
     D = rng.standard_normal((400, 5))
     D[:, 2] = (D[:, 0] + D[:, 1]) / np.sqrt(2.0) + 0.1 * D[:, 2]
-    prior = Prior(np.full(5, 1e-3), np.zeros(5))
+    prior = Prior(np.full(5, 1e-3), np.zeros(5), np.full(5, np.inf))
     scale = Scale(gram(D, 0.7 * (D[:, 0] + D[:, 1]) + rng.standard_normal(400)), prior, candidates(5))
     assert found_in(scale) == (0, 1)
 
@@ -60,7 +60,7 @@ def test_a_member_that_stood_for_two_is_parted_beside_the_others():
     D[:, 1] = 0.3 * D[:, 1] - D[:, 0]
     both = D[:, 0] + D[:, 1]
     D[:, 2] = both / 0.3 + 0.6 * D[:, 2]
-    prior = Prior(np.full(6, 1e-3), np.zeros(6))
+    prior = Prior(np.full(6, 1e-3), np.zeros(6), np.full(6, np.inf))
     scale = Scale(gram(D, 4.0 * both + 0.7 * D[:, 4] + rng.standard_normal(400)), prior, candidates(6))
     assert found_in(scale) == (0, 1, 4)
 
@@ -80,7 +80,7 @@ def test_what_has_one_origin_is_of_one_size():
     rng = np.random.default_rng(7)
     D = rng.standard_normal((400, 8))
     D[:, 3] = D[:, 2] / 8.0
-    prior = Prior(np.full(8, 1e-3), np.zeros(8))
+    prior = Prior(np.full(8, 1e-3), np.zeros(8), np.full(8, np.inf))
     data = gram(D, D[:, :3] @ np.full(3, 0.3) + rng.standard_normal(400))
     kinds = CausePrior(*(getattr(candidates(8), name) for name in ("columns", "weight", "exclusive")), ((0, 1, 2, 3),))
     apart, together = (Scale(data, prior, each) for each in (candidates(8), kinds))

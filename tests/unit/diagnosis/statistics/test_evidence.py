@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import lsq_linear
 from scipy.stats import norm
 
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale
@@ -15,15 +16,16 @@ from camcomp.diagnosis.statistics.evidence import (
     estimate,
     freed,
     gram,
+    holding_back,
     log_bayes,
 )
 
 RNG = np.random.default_rng(7)
 
 
-def prior(k, sign=None, tolerance=0.01):
+def prior(k, sign=None, tolerance=0.01, reach=np.inf):
     every = np.ones(k)
-    return Prior(tolerance * every, 0.0 * every if sign is None else np.array(sign))
+    return Prior(tolerance * every, 0.0 * every if sign is None else np.array(sign), reach * every)
 
 
 def data(truth, n=300, k=4, seed=1):
@@ -90,11 +92,46 @@ def test_the_right_cause_wins_and_its_estimate_covers_the_truth():
     assert hits >= 16
 
 
+def strained(reach):
+    """Two similar columns, both far beyond their tolerances, a third that differs, and a small one."""
+    rng = np.random.default_rng(3)
+    D = rng.standard_normal((200, 4)) @ np.array([[1, 0.9, 0, 0], [0, 0.4, 0, 0], [0, 0, 1, 0.5], [0, 0, 0, 1]])
+    r = D @ np.array([1.5, -1.2, 0.8, 0.02]) + rng.standard_normal(200)
+    return D, r, gram(D, r), prior(4, tolerance=0.1, reach=reach)
+
+
+def test_no_tolerance_goes_beyond_its_reach_and_the_others_follow():
+    D, r, g, p = strained(0.3)
+    for members in ([], [0], [1, 2]):
+        precision = np.where(np.isin(np.arange(4), members), 0.1, 10.0)  # 1 over the prior deviation
+        ends = np.where(np.isin(np.arange(4), members), np.inf, 0.3)
+        asked = lsq_linear(np.vstack([D, np.diag(precision)]), np.append(r, np.zeros(4)), (-ends, ends), tol=1e-14)
+        assert estimate(g, p, members)[0] == pytest.approx(asked.x, abs=1e-6)
+        free = prior(4, tolerance=0.1)
+        mean = estimate(g, free, members)[0]
+        chi2 = [np.sum((r - D @ x) ** 2) + np.sum((precision * x) ** 2) for x in (mean, asked.x)]
+        assert holding_back(base(g, free), p, members) == pytest.approx(0.5 * (chi2[1] - chi2[0]), rel=1e-4)
+
+
+def test_what_needs_no_tolerance_beyond_its_reach_wins():
+    """1000 rows strain a tolerance as far as they like for what a prior of sets asks for a second cause."""
+    rng = np.random.default_rng(5)
+    D = rng.standard_normal((1000, 2))
+    g = gram(D, D @ np.array([0.5, 0.35]) + rng.standard_normal(1000))
+    candidates = CausePrior(((0,), (1,)), np.log(np.full(2, 1e-4)), lambda i, j: False)
+
+    def lead(p):
+        scale = Scale(g, p, candidates)
+        return scale((0, 1)) + candidates.prior((0, 1)) - scale((0,)) - candidates.prior((0,))
+
+    assert lead(prior(2, tolerance=0.1)) < 0.0 < lead(prior(2, tolerance=0.1, reach=0.2))
+
+
 def test_freed_columns_are_those_of_a_wide_prior():
     rng = np.random.default_rng(8)
     D = rng.standard_normal((60, 4))
     data = gram(D, D @ np.array([0.5, -0.2, 0.1, 0.4]) + rng.standard_normal(60))
-    stated = Prior(np.array([0.1, 0.2, 0.3, 0.1]), np.zeros(4))
+    stated = Prior(np.array([0.1, 0.2, 0.3, 0.1]), np.zeros(4), np.full(4, np.inf))
     wide = replace(stated, tolerance=np.array([0.1, 10.0, 0.3, 10.0]))
     got, wanted = freed(base(data, stated), [1, 3]), base(data, wide)
     for name in ("mean", "covariance", "precision"):

@@ -19,7 +19,7 @@ def test_a_pattern_given_twice_counts_once():
 def test_normal_equations_of_patterns_are_those_of_the_stacked_rows(weight):
     """Two runs, two kinds of channel; a free column and one with a tolerance."""
     rng = np.random.default_rng(3)
-    prior = Prior(np.array([0.1, 0.2]), np.zeros(2))
+    prior = Prior(np.array([0.1, 0.2]), np.zeros(2), np.full(2, np.inf))
     W, r = [rng.normal(size=(30, 2)) for _ in range(2)], [rng.normal(size=30) for _ in range(2)]
     D = [[rng.normal(size=(20, 2)), rng.normal(size=(10, 1))] for _ in range(2)]
     factor = [np.repeat(w, [20, 10]) for w in weight]
