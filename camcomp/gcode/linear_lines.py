@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camcomp.ground.compiled import entry
 from camcomp.ground.datatypes import LINE, RAPID, Floats, Ints
@@ -33,8 +34,8 @@ class LinearMotions(NamedTuple):
     """Motions of consecutive linear moves, n of them."""
 
     row: Ints  # (n,) line, counted from the first line of the scan
-    begin: Ints  # (n, 5) index of each word's letter, -1 when the word is not there
-    finish: Ints  # (n, 5) index behind each word
+    begin: NDArray[np.int32]  # (n, 5) index of each word's letter, -1 when the word is not there
+    finish: NDArray[np.int32]  # (n, 5) index behind each word
     kind: np.ndarray  # (n,) RAPID or LINE
     start: Floats  # (n, 3) mm
     end: Floats  # (n, 3) mm
@@ -46,7 +47,7 @@ class LinearMotions(NamedTuple):
     def room(n: int) -> LinearMotions:
         """Arrays for n motions."""
         return LinearMotions(
-            row=np.empty(n, np.int64), begin=np.empty((n, 5), np.int64), finish=np.empty((n, 5), np.int64),
+            row=np.empty(n, np.int64), begin=np.empty((n, 5), np.int32), finish=np.empty((n, 5), np.int32),
             kind=np.empty(n, np.int8), start=np.empty((n, 3)), end=np.empty((n, 3)), feed=np.empty(n),
             code_stated=np.empty(n, np.bool_), feed_stated=np.empty(n, np.bool_),
         )  # fmt: skip

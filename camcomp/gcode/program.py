@@ -27,8 +27,8 @@ class Sites:
     """
 
     row: Ints  # (n,) line index, from 0
-    begin: NDArray[np.int64]  # (n, 13) index in the text of each word's letter, -1 for a missing word
-    finish: NDArray[np.int64]  # (n, 13) index behind each word
+    begin: NDArray[np.int32]  # (n, 13) index in the text of each word's letter, -1 for a missing word
+    finish: NDArray[np.int32]  # (n, 13) index behind each word
     unit: Floats  # (n,) mm per programmed unit
     feed_unit: Floats  # (n,) mm per programmed unit of feeds
     offset: Floats  # (n, 3) mm from a local value to the program frame

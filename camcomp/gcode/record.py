@@ -41,7 +41,7 @@ class Recorder:
         self._starts = text.starts
         self._count = 0
         self._numbers = array("d")  # NUMBERS per motion
-        self._spans = array("q")  # 26 per motion
+        self._spans = array("i")  # 26 per motion
         self._line_first = 0
         self.code_stated = False
         self.feed_stated = False
@@ -193,7 +193,7 @@ class Recorder:
         numbers[:, 24], numbers[0, 25], numbers[:, 26] = state.sense, state.waits, state.feed_unit
         numbers[:, 27:30] = numbers[:, 30:33] = state.turns_to
         numbers[0, 27:30] = state.turned
-        spans = np.full((n, len(LETTERS), 2), -1, np.int64)
+        spans = np.full((n, len(LETTERS), 2), -1, np.int32)
         spans[:, :LINEAR] = np.stack((found.begin, found.finish), axis=2)
         self._numbers.frombytes(numbers.tobytes())
         self._spans.frombytes(spans.tobytes())
@@ -217,7 +217,7 @@ class Recorder:
         """All motions as arrays."""
         n = self._count
         a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, NUMBERS))
-        spans = np.frombuffer(self._spans, np.int64).reshape(n, 13, 2) if n else np.zeros((0, 13, 2), np.int64)
+        spans = np.frombuffer(self._spans, np.int32).reshape(n, 13, 2) if n else np.zeros((0, 13, 2), np.int32)
         kind = a[:, 1].astype(np.int8)
         flags = a[:, 22].astype(np.int64)
         plane = a[:, 20].astype(np.int8)
@@ -245,8 +245,8 @@ class Recorder:
         fixed[self._fixed] = True
         sites = Sites(
             row=frozen(a[:, 0], np.int64),
-            begin=frozen(spans[:, :, 0], np.int64),
-            finish=frozen(spans[:, :, 1], np.int64),
+            begin=frozen(spans[:, :, 0], np.int32),
+            finish=frozen(spans[:, :, 1], np.int32),
             unit=frozen(a[:, 16]),
             feed_unit=frozen(a[:, 26]),
             offset=frozen(a[:, 17:20]),

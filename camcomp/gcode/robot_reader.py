@@ -226,7 +226,7 @@ class RobotReader:
             begin[k, :3] = site.instruction[0]
         no, ones = np.zeros(n, np.bool_), np.ones(n)
         return Sites(
-            row=frozen(rows, np.int64), begin=frozen(begin, np.int64), finish=frozen(begin, np.int64), unit=frozen(ones),
+            row=frozen(rows, np.int64), begin=frozen(begin, np.int32), finish=frozen(begin, np.int32), unit=frozen(ones),
             feed_unit=frozen(ones), offset=frozen(np.zeros((n, 3))), relative=frozen(no, np.bool_),
             centre_absolute=frozen(no, np.bool_), code=frozen(np.where(kind == RAPID, 0, 1), np.int8),
             plane=frozen(np.full(n, 17), np.int8), feed_mode=frozen(np.full(n, 94), np.int8), modal_feed=frozen(m.feed),

@@ -83,7 +83,7 @@ class InterpolatedMachine:
             np.empty(len(target), np.int64),
             np.zeros(len(target), np.int64),
         )
-        known.prepare(target, force)  # a wider range of forces makes new tiles
+        known.widen(force)
         found, nominal, tile[at] = self._looked(known, target.take(at, axis=0), force.take(at, axis=0))
         answer[at], rest = found[:, :BASIC], found[:, BASIC:]
         middle = target.take(between, axis=0), force.take(between, axis=0)

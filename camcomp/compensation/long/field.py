@@ -20,6 +20,7 @@ from camcomp.compensation.long.kernel import (
     BIAS,
     EXACT,
     LEVELS,
+    MISSING,
     MOST_DEGREE,
     SPLIT,
     exponents,
@@ -209,39 +210,36 @@ class Field:
         self.used = np.append(self.used, np.zeros(len(self.tiles.half) - len(self.used), np.bool_))
         self.used[tile[tile >= 0]] = True
 
-    def prepare(self, tips: Floats, force: Floats) -> Floats:
-        """Makes the tiles for points (n, 3) and forces (n, 3) that are going to be asked for; the points as look_up wants them."""
-        tips = shifted(tips, -self.corner)
+    def widen(self, force: Floats) -> None:
+        """Let the range hold forces (n, 3) that are going to be asked for; a wider one begins without tiles."""
         limits = zip(force.T, self.low - 1e-9, self.high + 1e-9, strict=True)
         if len(force) and any(each.min() < low or each.max() > high for each, low, high in limits):
             self._narrower.append((self._key, self.tiles, self._loaded))
             self._set_range(np.concatenate((force, [self.low, self.high])))
-        room = np.empty(len(tips), np.int64)
-        for _ in range(LEVELS + 1):
-            t = self.tiles
-            count = missing_cells(t.keys, t.values, t.size, tips, room)
-            if not count:
-                break
-            self._build(np.unique(room[:count]))
-        return tips
 
     def look(self, target: Floats, force: Floats | None, *, every: bool = True) -> tuple[Floats, Floats, Ints]:
         """Answers (n, .) as in look_up for targets (n, 3) under forces (n, 3); nominal joints; tiles (n,), negative: none.
 
-        Without forces the joints only.
+        Without forces the joints only. Makes the tiles that are not there yet.
         """
         n, m = len(target), len(self.machine.actuators)
         outputs = 0 if force is None else 9 + 2 * m if every else BASIC
         answer, nominal = np.empty((n, outputs)), np.empty((n if every else 0, m))
         force = np.zeros((n, 3)) if force is None else force
-        near = self.prepare(target, force)
-        tile = np.empty(n, np.int64)
-        packed = self.packed()
+        self.widen(force)
+        near, tile = shifted(target, -self.corner), np.empty(n, np.int64)
 
         def work(rows: slice) -> None:
             look_up(rows.start, rows.stop, m, every, near, force, answer, nominal, tile, *packed)
 
-        in_pieces(work, n, SLICE)
+        for _ in range(LEVELS + 1):
+            packed = self.packed()
+            in_pieces(work, n, SLICE)
+            missing = np.flatnonzero(tile == MISSING)
+            if not len(missing):
+                break
+            t, cells = self.tiles, np.empty(len(missing), np.int64)
+            self._build(np.unique(cells[: missing_cells(t.keys, t.values, t.size, near[missing], cells)]))
         self.mark(tile)
         return answer, nominal, tile
 

@@ -49,7 +49,7 @@ class LinearRun:
     def sites(self) -> Sites:
         """The words of the motions in the text of the run."""
         linear, n, state = self.linear, self.motions, self.state
-        begin, finish = np.full((2, n, len(LETTERS)), -1)
+        begin, finish = np.full((2, n, len(LETTERS)), -1, np.int32)
         there = linear.begin >= 0
         begin[:, :LINEAR] = np.where(there, linear.begin - self.text_at, -1)
         finish[:, :LINEAR] = np.where(there, linear.finish - self.text_at, -1)

@@ -183,10 +183,10 @@ class Runs:
             self._data, begin, len(self._data), self._last, motion_number(state), state.feed or 0.0, *self._flags,
             position, state.unit, np.array(state.offset), self.language.increments, room, limit,
         )  # fmt: skip
-        if why == MORE and n == 0 and self._more():
+        if why == MORE and n < limit and self._more():
             return self._linear(limit)
-        if n == 0 or (why == MORE and n < PROBE_MOTIONS and self._more()):
-            return self._linear(limit) if n else None
+        if n == 0:
+            return None
         self._flags = [bool(coded), bool(fed)]
         follow(state, code, feed, position)
         self._at = at

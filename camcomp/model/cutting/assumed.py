@@ -15,7 +15,7 @@ from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
 from camcomp.ground.records import dataclass, field
 from camcomp.ground.source_lines import named_lines
-from camcomp.ground.vectors import sizes
+from camcomp.ground.vectors import distinct, sizes
 from camcomp.model.config.cutting_tool import Cutter
 from camcomp.model.config.spec import Config
 from camcomp.model.cutting.track import PLUNGE_SINE
@@ -102,15 +102,16 @@ class ForceDoubts:
         if not _is_assumed(self.config):
             return
         known, way, top = path.known & ~path.machine, path.end - path.start, self.config.workpiece.stock_top_mm
-        level = known & (np.abs(way[:, 2]) < LEVEL_MM) & (np.hypot(way[:, 0], way[:, 1]) > LEVEL_MM)
+        level = known & (np.abs(way[:, 2]) < LEVEL_MM) & (sizes(way[:, :2]) > LEVEL_MM)
         cut = level & (path.kind != RAPID) & (True if top is None else path.end[:, 2] < top)
         flat = np.concatenate((self._flat, level & (path.kind == RAPID)))
         cuts, line = np.concatenate((self._cuts, cut)), np.concatenate((self._line, path.line))
         feeds = np.flatnonzero(known & (path.kind != RAPID))
-        numbers, which = np.unique(path.tool[feeds], return_inverse=True)
-        self.tools |= set(numbers.tolist())
+        tool = path.tool[feeds]
+        numbers = distinct(tool)
+        self.tools |= set(numbers)
         diameters = np.array([self._cutter(each).diameter_mm or 0.0 for each in numbers], float)
-        self._passes.add(path, feeds, diameters[which])
+        self._passes.add(path, feeds, diameters[np.searchsorted(numbers, tool)])
         self.lines |= set(line[1:-1][flat[1:-1] & cuts[:-2] & cuts[2:]].tolist())
         self._flat, self._cuts, self._line = flat[-2:], cuts[-2:], line[-2:]
 

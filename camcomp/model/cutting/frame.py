@@ -23,8 +23,7 @@ ALONG_SINE = 1e-6  # of the angle between feed and tool axis; below it the feed 
 
 def lateral(tangent: ArrayLike, tool_axis: ArrayLike) -> Floats:
     """Sine (n,) of the angle between the feed direction (n, 3) and the tool axis (3,); 1 for a level feed."""
-    across = _across(np.asarray(tangent, float), np.asarray(tool_axis, float))
-    return sizes(across)
+    return sizes(np.asarray(tangent, float) @ cross_with(np.asarray(tool_axis, float)))
 
 
 def path_frame(tangent: ArrayLike, tool_axis: ArrayLike) -> tuple[Floats, Floats, Floats]:

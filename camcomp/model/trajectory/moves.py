@@ -86,6 +86,8 @@ def moves_of(
 def mode_columns(modes: Sequence[PathMode]) -> tuple[Bools, Bools, Floats, Floats]:
     """Columns exact, stop, tolerance (mm) and merge (mm) (n,) of ToolMoves for path modes (n,)."""
     known, which = numbered(modes)
-    table = [(each.exact, each.code == 611, each.tolerance_mm, each.merge_mm) for each in known]
-    columns = np.array(table, float).reshape(-1, 4)[which]
-    return columns[:, 0] > 0.0, columns[:, 1] > 0.0, columns[:, 2].copy(), columns[:, 3].copy()
+    exact = np.array([each.exact for each in known], bool)
+    stop = np.array([each.code == 611 for each in known], bool)
+    tolerance = np.array([each.tolerance_mm for each in known], float)
+    merge = np.array([each.merge_mm for each in known], float)
+    return exact[which], stop[which], tolerance[which], merge[which]

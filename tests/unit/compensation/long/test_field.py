@@ -16,10 +16,8 @@ FORCE = np.array([[215.0, -10.0, -25.0], [-215.0, 200.0, 0.0]])
 
 def ask(known, target, force):
     """(correction, shift, tilt, drives, change of joints), nominal joints, tiles."""
-    near = known.prepare(target, force)
-    n, m = len(target), len(known.machine.actuators)
-    answer, nominal, tile = np.full((n, 9 + 2 * m), np.nan), np.full((n, m), np.nan), np.empty(n, np.int64)
-    look_up(0, n, m, True, near, force, answer, nominal, tile, *known.packed())
+    answer, nominal, tile = known.look(target, force)
+    m = len(known.machine.actuators)
     return np.split(answer, [3, 6, 9, 9 + m], axis=1), nominal, tile
 
 
@@ -113,6 +111,17 @@ def test_a_cube_with_points_out_of_reach_is_divided(orthoglide):
     exact = correct(job.machine, near, np.zeros((1, 3)))
     assert tile[0] < 0 or np.abs(near + correction - exact.commanded).max() < 5e-5
     assert (known.tiles.values == -1).any()
+
+
+def test_points_in_known_cubes_are_looked_up_once_and_not_looked_for_before(orthoglide, monkeypatch):
+    target, force = points(np.random.default_rng(5), 50, np.array([-4.0, -4.0, -104.0]), np.array([4.0, 4.0, -96.0]))
+    known = Field(orthoglide, FORCE)
+    ask(known, target, force)
+    asked = []
+    monkeypatch.setattr(field_module, "look_up", lambda *args: asked.append(look_up(*args)))
+    monkeypatch.setattr(field_module, "missing_cells", None)
+    ask(known, target, force)
+    assert len(asked) == 1
 
 
 def test_far_out_of_reach_one_point_of_a_cube_is_tried_and_no_more(orthoglide):

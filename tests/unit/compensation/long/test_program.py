@@ -8,7 +8,7 @@ import pytest
 
 from camcomp.compensation.long import runs
 from camcomp.compensation.long.field import Field
-from camcomp.compensation.long.linear_run import NotInPieces
+from camcomp.compensation.long.linear_run import LinearRun, NotInPieces
 from camcomp.compensation.long.program import LongProgram
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.result import BOUND_UM
@@ -126,6 +126,15 @@ def test_cut_anywhere(cartesian, monkeypatch, chunk):
     monkeypatch.setattr(runs, "CHUNK_BYTES", chunk)
     monkeypatch.setattr(runs, "RUN", 16)
     assert_same(cartesian, mixed())
+
+
+def test_runs_are_full_wherever_a_chunk_of_the_file_ends(cartesian, monkeypatch):
+    monkeypatch.setattr(runs, "CHUNK_BYTES", 333)
+    monkeypatch.setattr(runs, "RUN", 50)
+    source = io.BytesIO((HEAD + "\n".join(circle(500)) + "\n").encode())
+    found = runs.Runs(source=source, name="p.nc", setup=setup_of(cartesian.config), dialect=None)
+    motions = [each.motions for each in found if isinstance(each, LinearRun)]
+    assert motions[-10:-1] == [50] * 9
 
 
 def test_long_lines_are_divided_alike(orthoglide):
