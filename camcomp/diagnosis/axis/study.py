@@ -22,7 +22,7 @@ from camcomp.diagnosis.axis.joint import study_channel
 from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
 from camcomp.diagnosis.axis.next_moves import next_moves
-from camcomp.diagnosis.axis.noise_floor import between_rows, following_floor, rows_floor
+from camcomp.diagnosis.axis.noise_floor import between_rows, following_floor, instants_apart, rows_floor
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, travel
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
@@ -205,9 +205,11 @@ def _study_following(found: AxisFindings, task: AxisTask, asymmetric: bool) -> f
     unseen = [
         between_rows(r.time, r.setpoint, late)[np.isin(r.time, m.time)] for r, m in zip(every, moves, strict=True)
     ]
+    apart = instants_apart([values[k] for k in train], [moves[k].speed for k in train], floor)
+    unsure = [np.hypot(np.abs(own).max(axis=1), apart * m.speed) for own, m in zip(unseen, moves, strict=True)]
     rows = task.rows(
         moves, values, channel="following", floor=floor, stated=stated is not None, asymmetric=asymmetric, runs=every,
-        whole=[(r.time, r.gap) for r in task.usable], noise=[np.hypot(1.0, np.abs(own).max(axis=1) / floor) for own in unseen], between=unseen,
+        whole=[(r.time, r.gap) for r in task.usable], noise=[np.hypot(1.0, own / floor) for own in unsure], between=unseen,
     )  # fmt: skip
     found.following = study_channel(found, rows, task.around, task.without)
     return late
