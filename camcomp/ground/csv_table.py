@@ -11,6 +11,7 @@ import csv
 import io
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -96,6 +97,10 @@ class CsvTable:
             message = f"'{cell}' in column {self.header[column]} is not a number" if cell else "the cell is empty"
             errors.append(ConfigError(self.rules.cell, message, at=self.at(row, column)))
         return value
+
+    def below(self, count: int) -> CsvTable:
+        """The table without its first rows."""
+        return replace(self, rows=self.rows[count:], _line=(self._line[0], *self._line[count + 1 :]))
 
     def values(self, columns: Sequence[int] | None = None) -> Floats:
         """Numbers (n, k) of some columns, default all. Raises ConfigError."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -37,6 +38,8 @@ def read_sampled(
         return read_tdms(data, file)
     if suffix == ".xlsx" or data.startswith(_ZIP):
         return read_xlsx(data, file, names)
+    if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        data = data.decode("utf-16", errors="replace").encode()
     if is_scope_text(data):
         return read_scope(data, file)
     if b"\0" in data[:4096]:

@@ -15,14 +15,14 @@ from camcomp.ground.errors import ConfigError
 from camcomp.model.motion.log_columns import DYNO, LINE, TEMPERATURE, TIME, TIP, TIP_SD, LogColumns, log_columns
 
 _USUAL = {  # in addition to the log's own names, most specific first; those of actuators are below
-    TIME: ("time_s", "time", "timestamp", "t"),
+    TIME: ("time_s", "time", "timestamp", "datetime", "date_time", "t", "zeit"),
     **{own: (f"measurement_{axis}", axis) for own, axis in zip(TIP, "xyz", strict=True)},
     TEMPERATURE: ("measurement_temperature", "temperature"),
 }
 _ACTUATOR = {  # names of an actuator's channels, {a}: its name; those of a drive count only with a unit of force or torque
-    "setpoint": ("{a}_cmd", "{a}_command", "{a}_commanded", "{a}_setpoint", "{a}_target", "{a}_desired", "command_{a}", "target_{a}",
+    "setpoint": ("{a}_cmd", "{a}_command", "{a}_commanded", "{a}_setpoint", "{a}_target", "{a}_desired", "{a}_soll", "command_{a}", "target_{a}",
                  *(f"{{a}}{n}_{word}" for n in ("", "1") for word in ("command_position", "set_position", "cmd_pos", "set_pos"))),
-    "encoder": ("{a}", "{a}_joint", "{a}_act", "{a}_actual", "{a}_measured", "{a}_position", "actual_{a}",
+    "encoder": ("{a}", "{a}_joint", "{a}_act", "{a}_actual", "{a}_measured", "{a}_ist", "{a}_position", "actual_{a}",
                 *(f"{{a}}{n}_{word}" for n in ("", "1") for word in ("actual_position", "act_pos"))),
     "drive": ("{a}_torque", "{a}_force", "torque_{a}", "force_{a}", "act_{a}", "{a}_act", "{a}_actual"),
     "load": ("se_{a}", "{a}_load", "{a}_second"),

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.recordings.sampled import SampledColumns
-from camcomp.diagnosis.recordings.units import clock
+from camcomp.diagnosis.recordings.units import clock, is_unit
+from camcomp.ground.bounds import number_of
 from camcomp.ground.csv_table import CsvTable, TableRules, read_csv
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
@@ -46,7 +47,10 @@ def of_table(
     table: CsvTable, columns: Sequence[int] | None = None, time: Floats | None = None, units: Sequence[str] | None = None,
     notes: Sequence[str] = (),
 ) -> SampledColumns:  # fmt: skip
-    """Some columns of a table; cells are read and checked on access."""
+    """Some columns of a table; cells are read and checked on access. units: of all its columns, else those of its first row."""
+    if units is None:
+        units = _units_below_names(table)
+        table = table.below(bool(units))
     wanted = range(len(table.header)) if columns is None else columns
     kept = [j for j in wanted if table.header[j] not in ("", UNNAMED)]
 
@@ -60,9 +64,17 @@ def of_table(
 
     names = tuple(table.header[j] for j in kept)
     return SampledColumns(
-        file=table.name, names=names, units=tuple(units or ("",) * len(names)), rows=len(table.rows), time=time,
+        file=table.name, names=names, units=tuple(units[j] for j in kept) if units else ("",) * len(names), rows=len(table.rows), time=time,
         read=read, at=at, notes=tuple(notes), headed=table.headed,
     )  # fmt: skip
+
+
+def _units_below_names(table: CsvTable) -> list[str]:
+    """Units of all columns from the first row, if that holds units in place of numbers; else none."""
+    cells = [table.text(0, j).strip("[]()") for j in range(len(table.header))]
+    given = [cell for cell in cells if cell]
+    words = table.headed and not any(number_of(cell.replace(",", ".")) is not None for cell in given)
+    return cells if words and any(is_unit(cell) for cell in given) else []
 
 
 def _clock_times(table: CsvTable, column: int) -> Floats | None:

@@ -49,11 +49,8 @@ def read_scope(data: bytes, name: str) -> list[SampledColumns]:
             timed[j] = []
         elif label:
             timed[max(timed)].append(j)
-    return [
-        of_table(table, columns, _times(table, j), [_unit(units, k) for k in columns])
-        for j, columns in timed.items()
-        if columns
-    ]
+    of_columns = [_unit(units, k) for k in range(len(table.header))]
+    return [of_table(table, columns, _times(table, j), of_columns) for j, columns in timed.items() if columns]
 
 
 def _begins_number(label: str) -> bool:

@@ -33,6 +33,7 @@ _CLOCK = re.compile(  # 11.10.2022 15:06:48.043, 2022-10-11T15:06:48,043Z, 15:06
     r"(?P<h>[01]?\d|2[0-3]):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)Z?",
     re.ASCII,
 )
+_NANOSECONDS = re.compile(r"\d{19}", re.ASCII)  # since 1970, of this century
 _SINCE_1970 = ((1e12, 1e13, 1e-3), (1e15, 1e16, 1e-6))  # from, to, s: ms and us of this century
 
 
@@ -47,8 +48,12 @@ def split_unit(name: str) -> tuple[str, str]:
     if found := _BRACKETS.fullmatch(name):
         return found[1], found[2].strip()
     base, _, unit = name.rpartition("_")
-    known = any(unit.lower() in factors for factors in _TO_LOG.values())
-    return (base, unit) if base and known else (name, "")
+    return (base, unit) if base and is_unit(unit) else (name, "")
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that some column of a log may have."""
+    return any(text.lower() in factors for factors in _TO_LOG.values())
 
 
 def factor_to(log: str, unit: str) -> float | None:
@@ -84,7 +89,9 @@ def seconds(stamps: Floats, factor: float | None) -> Floats | None:
 
 
 def clock(text: str) -> float | None:
-    """Seconds since 2000 of a date with its time of day, or of a time of day alone; None for other texts."""
+    """Seconds of a date with its time of day, of a time of day alone, or of ns since 1970; None for other texts."""
+    if _NANOSECONDS.fullmatch(text.strip()):
+        return 1e-9 * int(text)
     found = _CLOCK.fullmatch(text.strip())
     if found is None:
         return None

@@ -398,6 +398,26 @@ def test_names_that_controls_of_machine_tools_give_to_axes(read):
     assert "6 columns dropped" in got.told
 
 
+SLIDE = "datetime,x_soll [m],x_ist [m],note\n2025-03-04 10:11:12.5,0,0,a\n2025-03-04 10:11:13.5,0.001,0.0005,b\n"
+BELOW = "t;x_cmd;x_act;speed\n[ms];mm;in;mm/s\n0;0;0;1,5\n1000;1;0,0196850394;1,5\n"
+SINCE = "time,x_cmd,x_act\n1700000000000000000,0,0\n1700000001000000000,1,0.5\n"
+
+
+@pytest.mark.parametrize(
+    "text", [SLIDE, BELOW, SINCE, SINCE.encode("utf-16")], ids=["dates", "units below", "ns", "UTF-16"]
+)
+def test_what_loggers_write_of_a_slide(read, text):
+    """Dates under any of their names, units in a row below the names, ns since 1970, text of Windows; words for set-points."""
+    log = read(text, config="cartesian").logs["poses"]
+    assert list(log) == ["t_s", "cmd_x_mm", "act_x_mm"]
+    assert [values[1] for values in log.values()] == pytest.approx([1.0, 1.0, 0.5])
+
+
+def test_words_in_all_cells_of_the_first_row_are_no_units_by_themselves(read):
+    got = read("t,x_cmd,x_act\nfirst,low,high\n0,0,0\n1,1,0.5\n", config="cartesian")
+    assert got.code == 2 and "poses.csv:2:7: error[CC422]: 'low' in column x_cmd is not a number" in got.told
+
+
 CURRENT = "x_cmd,y_cmd,z_cmd,act_x,act_y,act_z,X1_Current\n0,0,0,0,0,0,1.5\n1,1,0,0,1,0,2\n2,2,0,0,2,0,-3\n"
 
 
