@@ -36,7 +36,8 @@ class ChannelData:
 
     train, test: runs that are fitted, and that are judged only. numbers: of the runs in their experiment. floor: noise of the
     channel. whole: times and values of every row. asymmetric: whether friction in the drive force differs between the
-    directions, which deflects the loop. noise (n,) per run: of rows, in floors; 1 where it is not given. between (n, 2) per run: what it is not known to for want
+    directions, which deflects the loop. unsure (n,) per run: what rows are not known to beside the floor, nothing where it is not given; misfit: what is
+    left of them, in floors, at least 1, beside which that counts. between (n, 2) per run: what it is not known to for want
     of set-points between its rows. healthy: columns of
     the sizes that every axis has; inertia: those that are force of inertia alone. covariates (n,) of the dictionary. response:
     what causes with their amplitudes (d,) add to the channel of run k (n,). level: constant without a meaning. clock: standard
@@ -54,7 +55,8 @@ class ChannelData:
     stated: bool
     whole: Sequence[tuple[Floats, Floats]]
     asymmetric: bool = False
-    noise: Sequence[Floats] = ()
+    unsure: Sequence[Floats] = ()
+    misfit: float = 1.0
     between: Sequence[Floats] = ()
     healthy: Sequence[Sizes] = ()
     inertia: Sequence[Sizes] = ()
@@ -80,9 +82,17 @@ class ChannelData:
         return [np.isin(run.time, m.time) for run, m in zip(self.runs, self.moves, strict=True)]
 
     def in_floors(self, rows: Mapping[int, Floats]) -> Floats:
-        """Rows of the fitted runs one after the other, each over its noise in floors. rows: values (n,) or columns (n, k) by run."""
-        each = [(rows[k].T / self.noise[k]).T if self.noise else rows[k] for k in self.train]
-        return np.concatenate(each)
+        """Rows of the fitted runs one after the other, each over its noise. rows: values (n,) or columns (n, k) by run."""
+        return np.concatenate([(rows[k].T / self.noise(k)).T for k in self.train])
+
+    def noise(self, run: int) -> Floats:
+        """Noise (n,) of the rows of a run beside what is left of them, 1 where they are known to the floor."""
+        own = self.unsure[run] if self.unsure else np.zeros(len(self.values[run]))
+        return np.asarray(np.hypot(1.0, own / (self.misfit * self.floor)))
+
+    def beside(self, left: Floats) -> ChannelData:
+        """The data beside what is left (n,) of the fitted runs, each row over its noise."""
+        return replace(self, misfit=max(float(np.sqrt(np.mean(left**2))) / self.floor, 1.0))
 
     def healthy_columns(self, run: int) -> Floats:
         """Columns (n, q) of healthy sizes of all kinds."""
@@ -132,10 +142,7 @@ class ChannelData:
         forms = [self.friction_unknown(k, sizes, each) for k, each in enumerate(caused)]
         return replace(
             self, healthy=[{**own, CLOCK: each} for own, each in zip(self.healthy, slopes, strict=True)],
-            noise=[
-                np.hypot(1.0, np.hypot(within_a_row(each), form) / self.floor)
-                for each, form in zip(inertia, forms, strict=True)
-            ],
+            unsure=[np.hypot(within_a_row(each), form) for each, form in zip(inertia, forms, strict=True)],
         )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ from camcomp.diagnosis.axis.linear_sets import (
     CAUSES,
     PASSES,
     LinearFit,
+    beside_misfit,
     by_term,
     covariate_ranges,
     explained,
@@ -77,6 +78,7 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     at = [np.zeros(len(t.parameters)) for t in terms]
     for again in range(PASSES + 1):
         responses = [joint_columns(data, terms, k, at) for k in range(len(data.values))]
+        data = beside_misfit(data, responses)
         sd = noise_of_rows(data, responses)
         linear = explained(data, terms, responses, sd)
         members = linear.found.members

@@ -94,7 +94,7 @@ def study_channel(found: AxisFindings, rows: ChannelData, around: AxisSurroundin
 
 def _find_ripple(found: AxisFindings, channel: AxisChannel) -> None:
     """A line of the residual of a drive force over the travel, where it is larger than on healthy machines."""
-    line = ripple([r.move for r in channel.fitted], channel.left)
+    line = ripple([r.move for r in channel.fitted], channel.left, channel.columns)
     if line is None or line.amplitude**2 / 2.0 <= (MINOR * channel.floor) ** 2:
         return
     found.ripple = line
@@ -128,6 +128,7 @@ def _behind_causes(
 ) -> ChannelFit:
     """The fit of a following error with the residual of its written laws and causes. columns (n, q): of the laws, per run."""
     rest = [values - data.response(k, done.acting) for k, values in enumerate(data.values)]
+    data = data.beside(data.in_floors(dict(enumerate(done.left))))
     rows, values = (data.in_floors(dict(enumerate(each))) for each in (columns, rest))
     sizes, covariance = healthy_sizes(rows, values, data.floor)
     left = [own - each @ sizes for own, each in zip(rest, columns, strict=True)]
@@ -313,10 +314,10 @@ def _channel(rows: ChannelData, done: ChannelFit, sure: Sequence[Bools]) -> Axis
     constant = done.sizes["offset"][0] if rows.channel == "force" else 0.0
     pushing = [each for each in done.acting if each[0].run is not None]
     pushed = [rows.response(k, pushing) for k in range(len(values))]
-    spread = 1.0
-    if rows.noise:  # as large as it is seen to be at most
-        floors = [(rows.noise[k], np.maximum(np.abs(done.left[k]) / rows.floor, 1.0)) for k in rows.train]
-        spread = float(np.sqrt(np.mean(np.concatenate([np.minimum(*each) for each in floors]) ** 2)))
+    rows = replace(rows, misfit=1.0)
+    # as large as it is seen to be at most
+    floors = [(rows.noise(k), np.maximum(np.abs(done.left[k]) / rows.floor, 1.0)) for k in rows.train]
+    spread = float(np.sqrt(np.mean(np.concatenate([np.minimum(*each) for each in floors]) ** 2)))
     channel = AxisChannel(
         runs=[
             ChannelRun(
@@ -341,8 +342,7 @@ def _channel(rows: ChannelData, done: ChannelFit, sure: Sequence[Bools]) -> Axis
         ]
         known = [np.hypot(each, rising(pushed[k], moves[k].time, rise)) for k, each in zip(order, own, strict=True)]
         left = [each / np.hypot(1.0, by / rows.floor) for each, by in zip(left, known, strict=True)]
-    if rows.noise:
-        left = [each / rows.noise[k] for k, each in zip(order, left, strict=True)]
+    left = [each / rows.noise(k) for k, each in zip(order, left, strict=True)]
     left = [each[sure[k]] for k, each in zip(order, left, strict=True)]
     channel.gate = judge(left, [moves[k].time[sure[k]] for k in order], rows.floor, [rows.runs[k].name for k in order])
     return channel

@@ -167,7 +167,7 @@ def _found(rows: AxisRows) -> FoundLaw | None:
 
 def _waves(rows: AxisRows, left: Sequence[Floats]) -> list[Form]:
     """The strongest period of residuals over the travel: in common for both directions, or separate where that says clearly more."""
-    line = ripple(list(rows.moves), list(left))
+    line = ripple(list(rows.moves), list(left), np.ones((sum(map(len, left)), 1)))
     if line is None:
         return []
     one = Form(

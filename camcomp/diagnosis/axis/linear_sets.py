@@ -13,7 +13,7 @@ import numpy as np
 
 from camcomp.diagnosis.axis.channel_data import ChannelData, shrunk
 from camcomp.diagnosis.axis.effect_columns import AxisCause
-from camcomp.diagnosis.axis.row_noise import noise_after_fit
+from camcomp.diagnosis.axis.row_noise import left_of_fit, noise_after_fit
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
 from camcomp.diagnosis.model.discrepancy import covariate_columns, smooth_functions
 from camcomp.diagnosis.model.evidence import Background, LinearModel
@@ -151,14 +151,22 @@ def misfit(
     return float(np.sum((y - A @ c) ** 2) + sd**2 * np.sum((c / np.maximum(prior, 1e-30)) ** 2))
 
 
+def beside_misfit(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> ChannelData:
+    """The data beside what all columns leave."""
+    return data.beside(left_of_fit(*_all_columns(data, responses)))
+
+
 def noise_of_rows(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> float:
     """Standard deviation of a row that counts as one of its own, from residuals jointly with all columns.
 
     Rows that are correlated count for less: the variance is that of a row times the rows that count as one.
     """
+    return noise_after_fit(*_all_columns(data, responses), data.floor)
+
+
+def _all_columns(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
     A = data.in_floors({k: np.hstack((responses[k][0], data.healthy_columns(k))) for k in data.train})
-    y = data.in_floors({k: data.values[k] - responses[k][1] for k in data.train})
-    return noise_after_fit(A, y, data.floor)
+    return A, data.in_floors({k: data.values[k] - responses[k][1] for k in data.train})
 
 
 def explained(
@@ -180,7 +188,7 @@ def explained(
         groups.append(
             Group(
                 name=str(k), label="axis", y=y, A=A[:, None], N=np.zeros((n, 1, 0)),
-                sd=sd * (data.noise[k] if data.noise else np.ones(n))[:, None], B={**white, **smooth},
+                sd=sd * data.noise(k)[:, None], B={**white, **smooth},
             )
         )  # fmt: skip
     start, placed = 0, []

@@ -19,8 +19,13 @@ def log_gain(left: Floats, columns: Floats, more: Floats, floor: float) -> float
 
 def noise_after_fit(columns: Floats, values: Floats, floor: float) -> float:
     """Standard deviation of a row that counts as one of its own, from what columns (n, k) leave of values (n,)."""
+    return noise_of(left_of_fit(columns, values), floor)
+
+
+def left_of_fit(columns: Floats, values: Floats) -> Floats:
+    """What columns (n, k) leave of values (n,) or (n, m)."""
     A = columns / (np.sqrt(np.mean(columns**2, axis=0)) + 1e-300)
-    return noise_of(values - A @ np.linalg.lstsq(A, values, rcond=1e-9)[0], floor)
+    return np.asarray(values - A @ np.linalg.lstsq(A, values, rcond=1e-9)[0])
 
 
 def noise_of(left: Floats, floor: float) -> float:

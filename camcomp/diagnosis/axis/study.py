@@ -209,7 +209,7 @@ def _study_following(found: AxisFindings, task: AxisTask, asymmetric: bool) -> f
     unsure = [np.hypot(np.abs(own).max(axis=1), apart * m.speed) for own, m in zip(unseen, moves, strict=True)]
     rows = task.rows(
         moves, values, channel="following", floor=floor, stated=stated is not None, asymmetric=asymmetric, runs=every,
-        whole=[(r.time, r.gap) for r in task.usable], noise=[np.hypot(1.0, own / floor) for own in unsure], between=unseen,
+        whole=[(r.time, r.gap) for r in task.usable], unsure=unsure, between=unseen,
     )  # fmt: skip
     found.following = study_channel(found, rows, task.around, task.without)
     return late

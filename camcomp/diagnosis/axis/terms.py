@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 from scipy.signal import savgol_filter
 
+from camcomp.diagnosis.axis.row_noise import left_of_fit
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import direction, first_order
 from camcomp.model.seams import Seams
@@ -82,17 +83,20 @@ class Ripple:
     tried: int
 
 
-def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, longest: float = 60.0) -> Ripple | None:
+def ripple(
+    at: list[AxisTravel], left: list[Floats], columns: Floats, shortest: float = 0.5, longest: float = 60.0
+) -> Ripple | None:
     """The strongest line over position that is significant and equal in both directions of travel, else None.
 
-    Periods are scanned evenly in frequency, finer than the travel resolves. A line in one direction alone does not
-    count.
+    left (n,) per run: what columns (n, k) of all runs leave, which may have taken a part of the line. Periods are scanned
+    evenly in frequency, finer than the travel resolves. A line in one direction alone does not count.
     """
     x = np.concatenate([t.position for t in at])
     y = np.concatenate(left)
     v = np.concatenate([t.speed for t in at])
     way = np.concatenate([np.concatenate([[0.0], np.abs(np.diff(t.position))]) for t in at])
     moving = np.abs(v) > 1.0
+    ways = [v > 1.0, v < -1.0]
     if not moving.any():
         return None
     x, y, v, way = x[moving], y[moving] - y[moving].mean(), v[moving], way[moving]
@@ -101,8 +105,8 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
         return None
     frequency = np.arange(1.0 / min(longest, span / 4.0), 1.0 / shortest, 0.1 / span)
     lines = []
-    for sign in (1.0, -1.0):
-        on = v * sign > 0
+    for each in ways:
+        on = each[moving]
         if not way[on].any():
             return None
         middle = np.average(y[on], weights=way[on])
@@ -113,14 +117,22 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
     far = np.abs(frequency - frequency[best]) > 2.0 / span
     if not far.any() or strength[best] < STANDS_OUT * strength[far].max():
         return None
-    f = frequency[best]
-    A = np.stack([np.sin(2 * np.pi * f * x), np.cos(2 * np.pi * f * x)], axis=1)
-    c = np.linalg.lstsq(A, y, rcond=None)[0]
-    share = 1.0 - float(((y - A @ c) ** 2).sum() / max(float((y**2).sum()), 1e-300))
+    phase = 2.0 * np.pi * frequency[best] * np.concatenate([t.position for t in at])
+    waves, every = np.stack([np.sin(phase), np.cos(phase)], axis=1), np.concatenate(left)
+    (forward, backward), _ = _sizes(np.column_stack([waves * on[:, None] for on in ways]), columns, every)
+    (amplitude,), rest = _sizes(waves, columns, every)
+    share = 1.0 - float((rest[moving] ** 2).sum() / max(float((every[moving] ** 2).sum()), 1e-300))
     return Ripple(
-        period=1.0 / f, amplitude=float(np.hypot(*c)), forward=float(2 * np.abs(lines[0][best])),
-        backward=float(2 * np.abs(lines[1][best])), share=share, tried=len(frequency),
+        period=1.0 / frequency[best], amplitude=amplitude, forward=forward, backward=backward, share=share,
+        tried=len(frequency),
     )  # fmt: skip
+
+
+def _sizes(waves: Floats, columns: Floats, left: Floats) -> tuple[list[float], Floats]:
+    """Amplitudes of pairs of waves (n, 2 m) in residuals (n,) of a fit of columns (n, k), jointly with these, and what is left (n,)."""
+    apart = left_of_fit(columns, waves)
+    c = np.linalg.lstsq(apart, left, rcond=None)[0]
+    return [float(each) for each in np.hypot(c[::2], c[1::2])], left - apart @ c
 
 
 def _lines(x: Floats, y: Floats, weight: Floats, frequency: Floats) -> np.ndarray:
