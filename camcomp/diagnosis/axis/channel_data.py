@@ -90,8 +90,8 @@ class ChannelData:
         own = self.unsure[run] if self.unsure else np.zeros(len(self.values[run]))
         return np.asarray(np.hypot(1.0, own / (self.misfit * self.floor)))
 
-    def beside(self, left: Floats) -> ChannelData:
-        """The data beside what is left (n,) of the fitted runs, each row over its noise."""
+    def with_misfit(self, left: Floats) -> ChannelData:
+        """The data with the misfit of residuals (n,) of the fitted runs, each row over its noise."""
         return replace(self, misfit=max(float(np.sqrt(np.mean(left**2))) / self.floor, 1.0))
 
     def healthy_columns(self, run: int) -> Floats:

@@ -22,7 +22,6 @@ from camcomp.diagnosis.axis.linear_sets import (
     CAUSES,
     PASSES,
     LinearFit,
-    beside_misfit,
     by_term,
     covariate_ranges,
     explained,
@@ -33,6 +32,7 @@ from camcomp.diagnosis.axis.linear_sets import (
     residuals,
     scanned,
     settled,
+    with_misfit,
 )
 from camcomp.diagnosis.axis.row_noise import noise_after_fit
 from camcomp.diagnosis.model.calibration import calibration_of
@@ -78,7 +78,7 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     at = [np.zeros(len(t.parameters)) for t in terms]
     for again in range(PASSES + 1):
         responses = [joint_columns(data, terms, k, at) for k in range(len(data.values))]
-        data = beside_misfit(data, responses)
+        data = with_misfit(data, responses)
         sd = noise_of_rows(data, responses)
         linear = explained(data, terms, responses, sd)
         members = linear.found.members

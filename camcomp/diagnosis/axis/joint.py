@@ -128,7 +128,7 @@ def _behind_causes(
 ) -> ChannelFit:
     """The fit of a following error with the residual of its written laws and causes. columns (n, q): of the laws, per run."""
     rest = [values - data.response(k, done.acting) for k, values in enumerate(data.values)]
-    data = data.beside(data.in_floors(dict(enumerate(done.left))))
+    data = data.with_misfit(data.in_floors(dict(enumerate(done.left))))
     rows, values = (data.in_floors(dict(enumerate(each))) for each in (columns, rest))
     sizes, covariance = healthy_sizes(rows, values, data.floor)
     left = [own - each @ sizes for own, each in zip(rest, columns, strict=True)]

@@ -151,9 +151,9 @@ def misfit(
     return float(np.sum((y - A @ c) ** 2) + sd**2 * np.sum((c / np.maximum(prior, 1e-30)) ** 2))
 
 
-def beside_misfit(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> ChannelData:
-    """The data beside what all columns leave."""
-    return data.beside(left_of_fit(*_all_columns(data, responses)))
+def with_misfit(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> ChannelData:
+    """The data with the misfit that all columns leave."""
+    return data.with_misfit(left_of_fit(*_all_columns(data, responses)))
 
 
 def noise_of_rows(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> float:
