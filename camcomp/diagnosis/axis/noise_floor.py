@@ -83,7 +83,9 @@ def instants_apart(values: Sequence[Floats], speeds: Sequence[Floats], floor: fl
         return 0.0
     upper = speed >= np.median(speed)
     noise = float(np.median(square[upper]) / chi2.median(1))
-    return float(np.sqrt((noise - floor**2) / np.median(speed[upper]))) if noise > AT_FLOOR * floor**2 else 0.0
+    # two deviations of a median of squares, where three windows count as one
+    sure = AT_FLOOR + 8.0 / np.sqrt(np.count_nonzero(upper))
+    return float(np.sqrt((noise - floor**2) / np.median(speed[upper]))) if noise > sure * floor**2 else 0.0
 
 
 def between_rows(time: Floats, setpoint: Floats, late_s: float) -> Floats:
