@@ -9,8 +9,7 @@ import numpy as np
 from camcomp.ground.datatypes import Bools, Floats, Path
 
 _NEAR_MM = 0.5  # of the circle: set-points that far off are on another path
-_WHOLE = np.radians(350.0)  # a program that turns so far drives a circle
-_WIDEST_DEG = 15.0  # between rows of a circle that counts as measured
+_WIDEST_DEG = 15.0  # gap of a circle that counts as whole: between its rows, or of its program
 OUTWARD = np.column_stack([of(np.radians(np.arange(360) + 0.5)) for of in (np.cos, np.sin)])  # (360, 2) at every degree
 
 
@@ -87,7 +86,7 @@ def _circles(path: Path) -> list[Circle]:
         circle = Circle(path.centre[k], float(np.linalg.norm(path.start[k] - path.centre[k])), (a, b))
         found.setdefault(circle.name, circle)
         angle[circle.name] = angle.get(circle.name, 0.0) + abs(float(path.angle[k]))
-    return [circle for name, circle in found.items() if angle[name] > _WHOLE]
+    return [circle for name, circle in found.items() if angle[name] > np.radians(360.0 - _WIDEST_DEG)]
 
 
 def _turn(circle: Circle, counter_clockwise: bool, commanded: Floats, known: Bools) -> Turn | None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from camcomp.diagnosis.circles import Turn, points, turns_of
 from camcomp.diagnosis.fit.bench import Run
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.diagnosis.result.standards import AxisPositioning, CircularTest, CircularTurn, StandardValues
 from camcomp.diagnosis.statistics.standard_values import circular_deviation, positioning
 from camcomp.ground.datatypes import Floats
@@ -20,7 +21,6 @@ from camcomp.model.motion.twin import Twin
 
 LEAST = 5  # targets, and approaches of each from either side: ISO 230-2:2014, 5.3.2
 _STILL_MM = 1e-4  # between rows in which the axes stand
-_SAME_MM = 1e-3  # between targets that are one
 _ALONE = 1e-3  # largest share of an approach that other axes may make
 NO_STOPS = "ISO 230-2: no axis without load stopped at five targets, approached five times from either side, with the tip measured"
 NO_CIRCLES = (
@@ -63,7 +63,7 @@ def of_runs(twin: Twin, runs: Sequence[Run]) -> StandardValues:
         if loaded:
             continue
         for stop in stops(told, tip):
-            beside = np.delete(np.round(stop.target / _SAME_MM) * _SAME_MM, stop.axis)
+            beside = np.delete(np.round(stop.target / REPEATABILITY_MM) * REPEATABILITY_MM, stop.axis)
             lines.setdefault((stop.axis, tuple(beside + 0.0)), []).append(stop)
     found = [each for (axis, beside), own in lines.items() if (each := _positioning(axis, beside, own)) is not None]
     circles = tuple(_circular(name, loaded, own) for (name, loaded), own in rounds.items())
@@ -118,7 +118,7 @@ def _positioning(axis: int, beside: Sequence[float], found: Sequence[_Stop]) -> 
     """Values of a line, None where the standard asks for more."""
     by_target: dict[int, tuple[list[float], list[float]]] = {}
     for stop in found:
-        ways = by_target.setdefault(round(float(stop.target[axis]) / _SAME_MM), ([], []))
+        ways = by_target.setdefault(round(float(stop.target[axis]) / REPEATABILITY_MM), ([], []))
         ways[not stop.forward].append(stop.off)
     whole = [ways for _, ways in sorted(by_target.items()) if min(map(len, ways)) >= LEAST]
     if len(whole) < LEAST:

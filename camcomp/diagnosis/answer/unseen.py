@@ -10,10 +10,10 @@ import numpy as np
 from scipy.stats import t as student
 
 from camcomp.diagnosis.result.types import ShrinkageStep, UnseenShrinkage
+from camcomp.diagnosis.statistics.folds import PARTS
 from camcomp.diagnosis.statistics.probability import SURELY
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
-PARTS_OF_ONE = 4  # that a run visits, at least: it differs from the next one by as much as means of these
 USUAL_SPREAD = 0.3  # by which runs of programs differ in the logarithm of the ratio: some cut, some hardly move an axis
 USUAL_RUNS = 2  # that this is worth beside those at hand
 
@@ -68,7 +68,7 @@ def interval_of_next(runs: Sequence[JudgedRun]) -> tuple[float, float]:
     """95 % interval of the shrinkage of one more run.
 
     Logarithms of the ratio are taken as normal. They vary from run to run as they do between these and, pooled with that,
-    as means over PARTS_OF_ONE parts of a run do, or as runs usually do. Student's t. A cause that is real makes no run
+    as means over PARTS parts of a run do, or as runs usually do. Student's t. A cause that is real makes no run
     worse: the interval ends at 0 unless a run at hand got worse.
     """
     each = np.array([r.log_ratio for r in runs])
@@ -78,7 +78,7 @@ def interval_of_next(runs: Sequence[JudgedRun]) -> tuple[float, float]:
             square, freedom = square + USUAL_RUNS * USUAL_SPREAD**2 / len(runs), freedom + USUAL_RUNS / len(runs)
         else:
             inside, parts = scatter(np.array([r.of(r.parts == part).log_ratio for part in np.unique(r.parts)]))
-            square, freedom = square + inside / PARTS_OF_ONE, freedom + parts
+            square, freedom = square + inside / PARTS, freedom + parts
     low, high = of_one_more(float(each.mean()), square, freedom, 1.0 + 1.0 / len(each))
     return max(low, min(0.0, 1.0 - float(np.exp(each.max())))), high
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.arm.case import PoseCase
+from camcomp.diagnosis.arm.noise_floor import REPEATS
 from camcomp.diagnosis.arm.poses import ArmBench, Column, Poses
 from camcomp.diagnosis.model.design import bits, designed
 from camcomp.diagnosis.model.evidence import FREE
@@ -19,7 +20,6 @@ from camcomp.diagnosis.statistics.probability import SEED
 from camcomp.ground.datatypes import Floats
 
 POSES = 40  # of a proposal: an hour with a tracker
-REPEATS = 20  # poses to be visited again: a floor known to a sixth
 CANDIDATES = 400  # postures that are looked at
 
 

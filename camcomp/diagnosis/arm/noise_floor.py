@@ -27,6 +27,7 @@ from camcomp.diagnosis.model.noise import (
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.description import Robot
 
+REPEATS = ORDERS + LEAST_VALUES  # poses visited again, from which on a deviation is known beside a drift
 SAME_POSE = 1e-3  # rad or m between two visits of one pose; the model turns the rest of the way into mm
 
 
@@ -129,7 +130,7 @@ def _minus_drift(visits: Sequence[np.ndarray], gap: Floats, order: np.ndarray) -
     time removed.
     """
     more = sum(len(rows) - 1 for rows in visits)
-    if more < ORDERS + LEAST_VALUES:
+    if more < REPEATS:
         return [(_square(gap[rows]), len(rows) - 1.0) for rows in visits]
     waves = smooth_functions(order + 0.5, 0.0, len(order))
     left = np.concatenate([gap[rows] - gap[rows].mean(axis=0) for rows in visits])

@@ -31,8 +31,6 @@ from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance
 from camcomp.ground.datatypes import Floats
 from camcomp.model.motion.log_columns import log_columns
 
-SAME_TIME_CONSTANT = 0.02  # of a time constant: by which those of axes may differ and be one
-
 
 def unknown(axis: AxisFindings, whole: int) -> UnknownCause:
     """The unknown cause of an axis: its share of the gap, and its probability (even odds where no test shows it)."""
@@ -163,7 +161,7 @@ def _actuators_unseen(judged: Sequence[Sequence[AxisFindings]]) -> dict[str, Act
 
 
 def share_lag(found: Sequence[AxisFindings]) -> None:
-    """One lag where one common value serves for all axes that move (contract, section 5)."""
+    """One lag where one common value serves for all axes that move (contract, section 5): each within two KNOWN of it."""
     moving = [
         a
         for a in found
@@ -176,7 +174,7 @@ def share_lag(found: Sequence[AxisFindings]) -> None:
     value, half = np.array([e.value for e in each]), np.array([0.5 * (e.ci95[1] - e.ci95[0]) for e in each])
     weight = 1.0 / np.maximum(half, 1e-12) ** 2
     common = float(weight @ value / weight.sum())
-    if np.any(np.abs(value - common) > np.maximum(half, SAME_TIME_CONSTANT * abs(common))):
+    if np.any(np.abs(value - common) > np.maximum(half, 2.0 * KNOWN * abs(common))):
         return
     spread = max(KNOWN * abs(common), float(weight.sum() ** -0.5), float(np.std(value)))
     together = FoundCause(

@@ -11,15 +11,14 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.diagnosis.model.window import TRAVEL_BINS, best_window
+from camcomp.diagnosis.statistics.folds import PARTS
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
-CELL_S = 0.02  # in which a window begins and ends, before it is placed to a row
+END_S = 0.02  # in which most of a push comes or goes, two rows at least; no place ends like that
 SHORTEST_S = 0.2  # of a window
-QUARTERS = 4  # of a window, each of which has to be nearer to its shift than to none
 LEAST_SIZE = 2.0  # of the floor, that a push has to be: a force's zero wanders by less
 FARTHEST = 3  # cells by which an end is moved to its row
-SHARP_S = 0.02  # beyond an end, at least two rows, in which most of the shift has to be gone: no place ends like that
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ def find_window(
     best: tuple[float, int, int, int] | None = None
     for k, rest in rests.items():
         step = float(np.median(np.diff(times[k])))
-        cell = max(round(CELL_S / step), 1, len(rest) // 400)
+        cell = max(round(END_S / step), 1, len(rest) // 400)
         edges, shortest = np.arange(0, len(rest) - cell + 1, cell), cell * max(round(SHORTEST_S / (cell * step)), 2)
         score, first, last = best_window(np.ones((len(rest), 1)), rest[:, None], bases[k][:, None], edges, shortest)
         if score > (best[0] if best else 0.0):
@@ -54,14 +53,14 @@ def find_window(
     _, k, first, last = best
     shift, rest = _alone(rests[k], bases[k], first, last)
     step = float(np.median(np.diff(times[k])))
-    first, last = _placed(rest, first, last, FARTHEST * max(round(CELL_S / step), 1, len(rest) // 400))
+    first, last = _placed(rest, first, last, FARTHEST * max(round(END_S / step), 1, len(rest) // 400))
     shift, rest = _alone(rests[k], bases[k], first, last)
     if abs(shift) < LEAST_SIZE * floor or times[k][last - 1] - times[k][first] < SHORTEST_S:
         return None
     # it takes a while to come and to go: rows at its ends are not as high as it is
     inside, outside = away_from_ends(first, last, times[k])
     shift = _step(rests[k], inside, outside) / _step(_seen(bases[k], first, last), inside, outside)
-    parts = [float(np.mean(p) - np.mean(rest[outside])) for p in np.array_split(rest[inside], QUARTERS)]
+    parts = [float(np.mean(p) - np.mean(rest[outside])) for p in np.array_split(rest[inside], PARTS)]
     if not all(abs(p - shift) < 0.5 * abs(shift) for p in parts):
         return None
     return Window(k, first, last, shift), rest
@@ -116,9 +115,9 @@ def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
 
 
 def away_from_ends(first: int, last: int, time: Floats) -> tuple[Bools, Bools]:
-    """Rows (n,) inside a window and outside of it that are further than SHARP_S from both of its ends; all, where none are."""
+    """Rows (n,) inside a window and outside of it that are further than END_S from both of its ends; all, where none are."""
     ends = time[[first, min(last, len(time) - 1)]]
-    far = np.min(np.abs(time[:, None] - ends), axis=1) >= SHARP_S
+    far = np.min(np.abs(time[:, None] - ends), axis=1) >= END_S
     inside = np.zeros(len(time), bool)
     inside[first:last] = True
     inside, outside = (on & far if np.any(on & far) else on for on in (inside, ~inside))
@@ -127,7 +126,7 @@ def away_from_ends(first: int, last: int, time: Floats) -> tuple[Bools, Bools]:
 
 def sharp(window: Window, rest: Floats, time: Floats) -> bool:
     """Whether residuals (n,) N of the window's run jump at both of its ends, and both lie inside the run."""
-    reach = max(round(SHARP_S / float(np.median(np.diff(time)))), 2)
+    reach = max(round(END_S / float(np.median(np.diff(time)))), 2)
     if window.first < reach or window.last + reach > len(rest):
         return False
     ends = [(window.first, -1), (window.last, 1)]

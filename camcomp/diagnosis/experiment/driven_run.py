@@ -21,8 +21,8 @@ from camcomp.diagnosis.experiment.logged import Logged
 from camcomp.diagnosis.fit.label_offsets import STEP_S
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
-from camcomp.diagnosis.fit.starts import BEGUN_ANEW, STANDING_MM_PER_S, STOOD_MM
-from camcomp.diagnosis.model.noise import REPEATABILITY_MM
+from camcomp.diagnosis.fit.starts import STANDING_MM_PER_S, STOOD_MM
+from camcomp.diagnosis.model.noise import IN_A_ROW, REPEATABILITY_MM
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, shelf
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
@@ -287,7 +287,7 @@ def _guessed(time: Floats, values: Floats, most: float) -> Bools:
     here, before, after = k - 1, np.maximum(k - 2, 0), np.minimum(k, len(speed) - 1)
     turns = np.maximum(np.abs(speed[here] - speed[before]), np.abs(speed[after] - speed[here]))
     aside = turns * np.minimum(time[out] - at[k - 1], at[k] - time[out])
-    near = (at[k] - at[k - 1] < BEGUN_ANEW * usual) & (time[out] >= at[0]) & (time[out] <= at[-1])
+    near = (at[k] - at[k - 1] < IN_A_ROW * usual) & (time[out] >= at[0]) & (time[out] <= at[-1])
     out[out] = ~near | (aside > most)
     return out
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, means
 from camcomp.diagnosis.fit.columns import shape_default
-from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.by_channel import AT_ONCE, ByChannel
 from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS
 from camcomp.diagnosis.statistics.folds import Folds
 from camcomp.ground.datatypes import Floats
@@ -17,7 +17,6 @@ from camcomp.model import signal_path
 from camcomp.model.effect import Parameter
 
 _FINER = 17  # values between the neighbours of the best
-_AT_ONCE = 8  # values of a shape whose columns are made white together
 White = Callable[[int, ByChannel], ByChannel]  # what makes columns of a run white
 
 
@@ -55,9 +54,10 @@ def _gains(
 
     The prior decides where rows do not determine a shape: the first part of every warm-up is straight.
     """
-    gains = []
-    for i in range(0, len(shapes), _AT_ONCE):  # all together they are as large as all other columns
-        some, own = shapes[i : i + _AT_ONCE], len(candidate.parameters)
+    gains, own = [], len(candidate.parameters)
+    count = max(AT_ONCE // (own * sum(map(len, base.residual))), 1)  # all together are as large as all other columns
+    for i in range(0, len(shapes), count):
+        some = shapes[i : i + count]
         columns = quick_columns(bench, candidate, some)
         if columns is None:
             return None

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from camcomp.diagnosis.model.noise import IN_A_ROW
+from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.seams import missing_rows
 
@@ -20,7 +22,6 @@ if TYPE_CHECKING:
 
 Nuisance = tuple[str, float, list[Floats]]  # name, size, column (n, c) per run
 STOOD_MM = 5e-3  # by which what stands may move from row to row: a digit of its encoder
-UNDER_WAY = 8  # rows from the one to the other, in which its state is unknown
 STANDING_MM_PER_S = 0.05  # below which a tip has no direction of its own
 START_MM = 0.1  # by which an actuator has to move before its play is taken up: play and guides as bad as they come
 START_N = 1000.0  # how hard its guide may hold its carriage until then
@@ -28,7 +29,6 @@ ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
 STARTING_ROWS = 2
 SWING_S = 0.03  # times the speed with which a log begins: how far a loop may then stand from where it is told
 SWINGS_S = 0.06  # in which that dies away: loops of 5 to 60 Hz as they are tuned
-BEGUN_ANEW = 3.0  # usual steps between rows: across more the motion, and a loop's state behind them, are unknown
 
 
 def start_columns(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> list[Nuisance]:
@@ -89,7 +89,7 @@ def unknown_starts(bench: Bench, k: int) -> Floats:
 def _swing(time: Floats, rho: Floats) -> Floats:
     """How far (n, m) loops at rho (n, m) may swing that came in motion to the first row, or to one behind many missing ones."""
     out, step = np.zeros_like(rho), np.diff(time)
-    for i in (0, *np.flatnonzero(step > BEGUN_ANEW * float(np.median(step))) + 1):
+    for i in (0, *np.flatnonzero(step > IN_A_ROW * float(np.median(step))) + 1):
         if i + 2 < len(time) and step[i] > 0.0 and step[i + 1] > 0.0:
             first, second = (rho[i + 1] - rho[i]) / step[i], (rho[i + 2] - rho[i + 1]) / step[i + 1]
             speed = np.abs(
@@ -103,12 +103,12 @@ def _swing(time: Floats, rho: Floats) -> Floats:
 def _standing(rho: Floats) -> tuple[Bools, Bools]:
     """Rows (n,) in which an actuator at rho (n,) mm has its play not yet taken up: those with one common state, and those on its way.
 
-    On its way its carriage begins to follow at an unknown point. Where that takes many rows they share one state: the way
-    from one to the next is short.
+    On its way its carriage begins to follow at an unknown point. Where that takes more than a BLOCK of rows they share one
+    state: the way from one to the next is short.
     """
     moved = np.maximum.accumulate(np.abs(rho - rho[0]))
     still = moved < START_MM
     under_way = still & (moved > STOOD_MM)
-    if under_way.sum() > UNDER_WAY:
+    if under_way.sum() > BLOCK:
         under_way = np.zeros(len(rho), bool)
     return np.asarray(still & ~under_way), under_way

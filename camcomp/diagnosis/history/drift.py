@@ -1,12 +1,13 @@
 """Course of a parameter over the days: steady, drift or jumps, and the day of its next measurement.
 
-Estimates of n days with known deviations are described by one value, a straight line, or values that change at up to
-MOST_JUMPS days. The Bayesian information criterion chooses (Schwarz 1978), a richer description by EQUAL_LOG_ODDS more; a jump counts its day as a parameter (Yao 1988).
+Estimates of n days with known deviations are described by one value, a straight line, or values that change at some
+days. The Bayesian information criterion chooses (Schwarz 1978), a richer description by EQUAL_LOG_ODDS more; a jump counts its day as a parameter (Yao 1988).
 Least squares over all divisions by dynamic programming (Jackson et al. 2005).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal
@@ -16,7 +17,6 @@ import numpy as np
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
-MOST_JUMPS = 3
 FEWEST = 4  # measurements needed for a line or a jump
 
 
@@ -38,6 +38,9 @@ def course_of(days: Floats, values: Floats, deviations: Floats) -> Course:
     line, misfit = _line(days, values, weight)
     cost: list[tuple[float, Course]] = [(misfit + 2 * np.log(n) + 2.0 * EQUAL_LOG_ODDS, line)]
     for count, (starts, misfit) in enumerate(_steps(values, weight)):
+        price = (1 + 2 * count) * np.log(n) + 2.0 * EQUAL_LOG_ODDS * count
+        if price > min(each for each, _ in cost):  # of so many jumps alone
+            break
         last = slice(starts[-1], n)
         own = Course(
             kind="jumps" if count else "steady" if n >= FEWEST else "too few", jumps=tuple(starts[1:]),
@@ -45,7 +48,7 @@ def course_of(days: Floats, values: Floats, deviations: Floats) -> Course:
         )  # fmt: skip
         if n < FEWEST:
             return own
-        cost.append((misfit + (1 + 2 * count) * np.log(n) + 2.0 * EQUAL_LOG_ODDS * count, own))
+        cost.append((misfit + price, own))
     return min(cost, key=lambda each: each[0])[1]
 
 
@@ -76,7 +79,7 @@ def _line(days: Floats, values: Floats, weight: Floats) -> tuple[Course, float]:
     return line, float(np.sum(weight * (values - matrix @ [now, rate]) ** 2))
 
 
-def _steps(values: Floats, weight: Floats) -> list[tuple[tuple[int, ...], float]]:
+def _steps(values: Floats, weight: Floats) -> Iterator[tuple[tuple[int, ...], float]]:
     """For no, one, two, ... jumps: first rows of the pieces of the best division, and its weighted sum of squared residuals."""
     n, values = len(values), values - np.average(values, weights=weight)
     w, wv, wvv = (np.concatenate(([0.0], np.cumsum(each))) for each in (weight, weight * values, weight * values**2))
@@ -93,5 +96,6 @@ def _steps(values: Floats, weight: Floats) -> list[tuple[tuple[int, ...], float]
         before = ((a, *best(a, pieces - 1)) for a in range(pieces - 1, b))
         return min((own + squares(a, b), (*starts, a)) for a, own, starts in before)
 
-    each = (best(n, pieces) for pieces in range(1, min(MOST_JUMPS, n - 1) + 2))
-    return [(starts, left) for left, starts in each]
+    for pieces in range(1, n + 1):
+        left, starts = best(n, pieces)
+        yield starts, left

@@ -11,7 +11,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, means, thinned
 from camcomp.diagnosis.law.forms import Form, Sizes, SmoothForm, sizes
-from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.by_channel import AT_ONCE, ByChannel
 from camcomp.diagnosis.statistics.folds import RunColumns
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
@@ -21,7 +21,6 @@ from camcomp.model.law.expression import parse
 from camcomp.model.law.spline_map import splines, tensor
 from camcomp.model.statics.description import Robot
 
-AT_ONCE_BYTES = 12e6  # of functions that are worked out together, before rows are thinned
 Rows = TipRows | DriveRows
 
 
@@ -106,8 +105,8 @@ class TermRows(ABC):
 
     @cached_property
     def at_once(self) -> int:
-        """Forms whose functions of all rows fit into AT_ONCE_BYTES."""
-        return max(int(AT_ONCE_BYTES / (16.0 * sum(self.row_counts))), 4)
+        """Forms of two functions whose values in all rows, before rows are thinned, are AT_ONCE."""
+        return max(AT_ONCE // (2 * sum(self.row_counts)), 4)
 
 
 class TermBench(TermRows):

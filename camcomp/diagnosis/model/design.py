@@ -15,8 +15,6 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats
 
-EXCHANGES = 2  # rounds in which every candidate may be exchanged for a better one
-
 
 @dataclass(frozen=True, eq=False)
 class Design:
@@ -28,21 +26,24 @@ class Design:
 
 
 def designed(X: Floats, covariance: Floats, count: int) -> Design:
-    """`count` of n candidates with rows X (n, c, k) in units of the noise, under a prior covariance (k, k)."""
+    """`count` of n candidates with rows X (n, c, k) in units of the noise, under a prior covariance (k, k): exchanged one
+    by one until a whole round tells no more.
+    """
     root = np.linalg.cholesky(covariance)
     W, M = X @ root, np.eye(len(root))
     chosen: list[int] = []
-    count = min(count, len(X))
-    for _ in range((1 + EXCHANGES) * count):
-        if len(chosen) == count:  # the first one is given back
-            back = W[chosen.pop(0)]
-            M -= back.T @ back
-        spread = np.einsum("nik,kl,njl->nij", W, np.linalg.inv(M), W, optimize=True)
-        value = np.linalg.slogdet(np.eye(X.shape[1]) + spread)[1]
-        value[chosen] = -np.inf
-        chosen.append(int(np.argmax(value)))
-        M += W[chosen[-1]].T @ W[chosen[-1]]
-    return Design(tuple(chosen), bits(M), root @ np.linalg.inv(M) @ root.T)
+    count, gain = min(count, len(X)), -1.0
+    while gain < (gain := bits(M)):
+        for _ in range(count):
+            if len(chosen) == count:  # the first one is given back
+                back = W[chosen.pop(0)]
+                M -= back.T @ back
+            spread = np.einsum("nik,kl,njl->nij", W, np.linalg.inv(M), W, optimize=True)
+            value = np.linalg.slogdet(np.eye(X.shape[1]) + spread)[1]
+            value[chosen] = -np.inf
+            chosen.append(int(np.argmax(value)))
+            M += W[chosen[-1]].T @ W[chosen[-1]]
+    return Design(tuple(chosen), gain, root @ np.linalg.inv(M) @ root.T)
 
 
 def bits(M: Floats) -> float:

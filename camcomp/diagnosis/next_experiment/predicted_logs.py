@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from camcomp.diagnosis.experiment.driven_run import axes_along
+from camcomp.diagnosis.experiment.open_experiment import MOST_ROWS
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import build
 from camcomp.diagnosis.fit.measured import Measured
@@ -29,7 +30,6 @@ from camcomp.model.job import Job
 from camcomp.model.motion.run_path import path_of_program
 from camcomp.model.motion.timeline import schedule
 
-ROWS = 2500  # of a predicted log
 WARMS_K = 5.0  # largest further drift of a temperature
 USUAL_NOISE = (0.002, 0.0005, 1.0, 2.0)  # mm, mm, N, N: default for unmeasured tip, encoders, drives, dynamometer
 
@@ -186,7 +186,7 @@ def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
     last = timeline.end + candidate.design.dwell_s
     steps = [float(np.median(np.diff(t))) for t in problem.times if len(t) > 1]
     usual = float(np.median(steps)) if steps else 0.02
-    time = np.arange(0.0, last, max(usual, last / ROWS))
+    time = np.arange(0.0, last, max(usual, last / MOST_ROWS))
     conditions = job.conditions if candidate.cutting else replace(job.conditions, model=None)
     run_path = path_of_program(
         twin, "candidate", timeline, lay_track(path, conditions), time, started=candidate.started,

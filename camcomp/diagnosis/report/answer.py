@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from camcomp.diagnosis.law.words import listed
+from camcomp.diagnosis.model.verdict import SURE
 from camcomp.diagnosis.report.words import depends, percent, plain, remedy, shortened, sizes, term_size
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, FoundCause, GapSize, Law
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.report.plot import brief, micrometres
 
-SURE = 0.95  # probability from which it is not printed
 MOST_CAUSES = 3  # causes printed on the terminal
 MOST_LINES = 10  # lines on the terminal; outcomes beyond them are on the page only
 
@@ -68,7 +68,7 @@ def floor_text(gap: GapSize) -> str:
 
 
 def probability_text(probability: float) -> str:
-    """Text of a probability below SURE, else empty."""
+    """Text of a probability that is not above SURE, else empty."""
     return "" if probability > SURE else f", probability {100 * probability:.0f} %"
 
 

@@ -11,6 +11,8 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats, Ints
 
+AT_ONCE = 1_000_000  # values that are worked out together, and held in memory
+
 
 @dataclass(frozen=True, eq=False)
 class ByChannel:

@@ -16,7 +16,7 @@ from scipy.linalg import solve_triangular
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats, Ints
 
-PARTS = 4  # that are withheld: runs, or stretches of fewer runs
+PARTS = 4  # of a whole that are looked at one by one: of a log, of a run, of a disturbance
 RunColumns = Sequence[ByChannel]  # white columns (w, f) of every run
 
 

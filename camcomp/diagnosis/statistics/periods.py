@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.diagnosis.statistics.by_channel import AT_ONCE
 from camcomp.diagnosis.statistics.places import FALSE, RunGap
 from camcomp.ground.datatypes import Floats
 
 _TREND = 4  # terms of the polynomial that is taken out with the sines, and half waves of the longest period
 _STANDS_OUT = 0.2  # share of what the trend leaves
-_AT_ONCE = 1_000_000  # values held in memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ def _spectrum(y: Floats, x: Floats, frequencies: Floats, trend: Floats) -> tuple
     Q, _ = np.linalg.qr(trend)
     rest = y - Q @ (Q.T @ y)
     found = [np.zeros(0)]
-    for part in np.array_split(frequencies, max(len(frequencies) * len(x) // _AT_ONCE, 1)):
+    for part in np.array_split(frequencies, max(len(frequencies) * len(x) // AT_ONCE, 1)):
         turn = 2.0 * np.pi * x[:, None] * part
         waves = np.sin(turn), np.cos(turn)  # (n, f) each
         smooth = [Q.T @ each for each in waves]

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.fit.starts import UNDER_WAY, _standing
+from camcomp.diagnosis.fit.starts import _standing
+from camcomp.diagnosis.statistics.noise_model import BLOCK
 
 
 @pytest.mark.parametrize(
@@ -24,7 +25,7 @@ def test_rows_that_stand_and_rows_on_the_way(moved_mm, standing, under_way):
 
 
 def test_what_takes_many_rows_is_told_by_its_length():
-    step = 0.099 / np.arange(1, UNDER_WAY + 3)
-    for count in (UNDER_WAY, UNDER_WAY + 1):
+    step = 0.099 / np.arange(1, BLOCK + 3)
+    for count in (BLOCK, BLOCK + 1):
         rho = np.concatenate([[0.0], step[count - 1] * np.arange(1, count + 1), [0.2]])
-        assert _standing(rho)[1].any() == (count == UNDER_WAY)
+        assert _standing(rho)[1].any() == (count == BLOCK)
