@@ -19,7 +19,7 @@ from camcomp.model.seams import missing_rows
 CLIPPED = 6.0  # robust deviations beyond which a difference of rows is no noise
 LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
 RIGID_MM_PER_N = 1e-4  # spring of a drive for which none is stated
-STRETCH, LEAST_STRETCHES = 16, 8  # differences of rows that make a stretch, and stretches that tell a quiet one
+STRETCH = 16  # differences of rows that make a stretch
 LOWER_QUARTILE = 0.82  # of the scatter of such stretches of white noise, in units of the noise (4000 draws: 0.816)
 UNSTEADY = 1.5  # times the quiet stretches: of 4000 draws of 160 rows of white noise none had it
 RAPID_TIMES = 2.0  # of the program's feed: rows that are faster are no measure of the instrument
@@ -93,7 +93,7 @@ def steady_scatter(values: Floats, time: Floats) -> float:
     it, something swings in some of them; then their lower quartile counts, less what chance takes off it.
     """
     bend, whole = _bends(values, time), row_scatter(values, time)
-    if bend is None or len(bend) < LEAST_STRETCHES * STRETCH:
+    if bend is None or len(bend) < LEAST_VALUES * STRETCH:
         return whole
     stretches = bend[: len(bend) // STRETCH * STRETCH].reshape(-1, STRETCH)
     quiet = float(np.quantile(np.sqrt(np.mean(stretches**2, axis=1)), 0.25)) / LOWER_QUARTILE

@@ -12,11 +12,11 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
 from camcomp.diagnosis.model.noise import IN_A_ROW
-from camcomp.diagnosis.model.window import LONGEST, best_window
+from camcomp.diagnosis.model.window import best_window
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
 from camcomp.ground.datatypes import Floats, Ints
 
-LEAST_GAIN = 60.0  # chi-square of one interval; the best of 1e5 by chance is 20
 _BLOCKS = 60
 _JUMPS = 5  # of a leftover, between which an interval is tried
 
@@ -38,12 +38,13 @@ def likely_intervals(
     """Intervals of time, by the names of the candidate's shapes, in which it explains much of `rest` (white, per run).
 
     always: white columns (w, p) per run of the candidate acting all the time. places: position of a run's white rows in
-    its time, 0 to 1. Empty where every gain is below LEAST_GAIN. The first interval has the largest gain. Noise with a
-    long memory hides all of a shift but its begin and end; therefore the further intervals lie between the largest
-    jumps.
+    its time, 0 to 1. Empty where no gain exceeds, by odds of EQUAL_LOG_ODDS, what so many intervals make by chance. The
+    first interval has the largest gain. Noise with a long memory hides all of a shift but its begin and end; therefore
+    the further intervals lie between the largest jumps.
     """
     start, end = (each.name for each in candidate.shapes)
-    best: tuple[float, list[tuple[float, float]]] = (LEAST_GAIN, [])
+    least = 2.0 * (log_intervals(len(bench.runs)) + EQUAL_LOG_ODDS)
+    best: tuple[float, list[tuple[float, float]]] = (least, [])
     for k, run in enumerate(bench.runs):
         order = np.argsort(places(k), kind="stable")
         at = run.run_path.started + run.run_path.time[0] + places(k)[order] * np.ptp(run.run_path.time)
@@ -56,7 +57,7 @@ def likely_intervals(
             rise = getattr(candidate.effect, "RISE_S", 0.0)
             jumps = _jumps(np.add.reduceat(rest[k][order] ** 2, starts))
             pairs = [(i, j), *(pair for pair in combinations(sorted({i, j, *jumps}), 2) if pair != (i, j))]
-            fair = [(i, j) for i, j in pairs if IN_A_ROW <= j - i <= LONGEST * len(instants)]
+            fair = [(i, j) for i, j in pairs if IN_A_ROW <= j - i <= EVEN * len(instants)]
             best = gain, [_between(instants, i, j, rise) for i, j in fair]
     return [{start: begin, end: over} for begin, over in best[1]]
 

@@ -17,14 +17,14 @@ from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, TermRows, s
 from camcomp.diagnosis.law.forms import Form, Sizes, SmoothForm
 from camcomp.diagnosis.law.screen import Screen, TermGrid
 from camcomp.diagnosis.law.shapes import Shapes
+from camcomp.diagnosis.model.discrepancy import ORDERS
 from camcomp.diagnosis.model.noise import MINOR
+from camcomp.diagnosis.model.search import MOST
 from camcomp.diagnosis.statistics.folds import ALTERNATING, Folds, RunColumns, Split, gains, usual_split, withheld
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
-MOST_TERMS = 6
 BETTER = 0.9  # of what the causes or a law leave on withheld parts: a law, or another one, has to leave less
-BOTH = 6  # splines over each of two covariates; twice as many over a single one
 _SINGLE = ("heading_rad", "temp_C", "cut_min", "fx_N", "fy_N", "fz_N")  # covariates of a map by themselves
 REFINED = 7  # kinds of terms whose shapes are followed at every step
 CONSTANT = Form(family="constant", about=(), texts=("1",), units=("",))
@@ -103,7 +103,7 @@ class _Search:
         chosen: list[Term] = []
         pool: list[Term] = []
         score = 0.0
-        while len(chosen) < MOST_TERMS:
+        while len(chosen) < MOST:
             step = self._beside(chosen)
             ranked = [each for each in self.screen.gains(step) if each[0] > 0.0]
             fine = [self._refined(step, term) for _, term in self._leaders(ranked)]
@@ -255,7 +255,7 @@ def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundLaw | None:
         for spot in [s for s in where if all(s != each.spot for each in chosen)]:
             size = bench.sizes(spot)
             for names in _covariates(spot, size):
-                counts = (2 * BOTH,) if len(names) == 1 else (BOTH, BOTH)
+                counts = (2 * ORDERS,) if len(names) == 1 else (ORDERS, ORDERS)
                 form = SmoothForm(about=names, limits=tuple(size.limits[n] for n in names), counts=counts)
                 white, precision = shapes.columns(Term(spot, form))
                 gain = withheld(gains(*step.together([white]), precision))

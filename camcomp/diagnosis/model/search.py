@@ -15,7 +15,7 @@ from camcomp.ground.datatypes import Floats
 MOST = 5  # causes of a set
 ROUNDS = 6  # of searches about what was found, at most
 KEPT = 12  # sets of each size that are enlarged
-SLACK = 6.0  # log posterior by which the best set of a size may lie behind, and be enlarged
+SLACK = 6.0  # log posterior by which a set may lie behind the best one, and be enlarged or fitted
 
 
 def best_of(values: Mapping[Members, float]) -> Members:

@@ -1,16 +1,16 @@
 """Which rows in succession show a motion that is there for a while: the window whose column explains most of a residual.
 
 With d the motion in a window, r the residual beside columns Q, the chi-square is (d'r)^2 / (d'd - |Q'd|^2); running sums give
-it for all windows at once.
+it for all windows at once. What lasts for more than half of a run is how the run is.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Floats, Ints
 
-LONGEST = 0.6  # of a run's rows: what lasts longer is how the run is
 LEAST_FREE = 0.02  # of a window's squares that the other columns have to leave
 TRAVEL_BINS = 40  # parts of a travel in which places are told apart
 
@@ -30,7 +30,7 @@ def best_window(motion: Floats, left: Floats, basis: Floats, edges: Ints, shorte
     taken = _sums(np.einsum("nc,nck->nk", motion, basis))[edges]
     rows, whole = (each[None, :] - each[:, None] for each in (edges, size))
     free = whole - sum((each[None, :] - each[:, None]) ** 2 for each in taken.T)
-    good = (rows >= shortest) & (rows <= LONGEST * n) & (free > LEAST_FREE * whole)
+    good = (rows >= shortest) & (rows <= EVEN * n) & (free > LEAST_FREE * whole)
     gain = np.where(good, (said[None, :] - said[:, None]) ** 2 / np.where(good, free, 1.0), 0.0)
     i, j = np.unravel_index(int(np.argmax(gain)), gain.shape)
     return (float(gain[i, j]), int(edges[i]), int(edges[j])) if gain[i, j] > 0.0 else (0.0, 0, 0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.candidates import PlacedCause
-from camcomp.diagnosis.model.search import search_sets
+from camcomp.diagnosis.model.search import SLACK, search_sets
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
     Members,
@@ -27,7 +27,6 @@ from camcomp.ground import progress
 from camcomp.ground.datatypes import Floats
 
 TRIED = 5  # sets fitted about a fit that are larger than it, as many of those that are not, and of single causes
-HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +91,7 @@ class FittedSets:
             best = problem.candidates.value(near)
             for value, members in scored(scale, first)[:TRIED]:
                 best = max(best, value)
-                if value > best - HOPELESS_LOG:
+                if value > best - SLACK:
                     self.fit(members, near)
         if not near.members:
             for _, members in scored(scale, [(i,) for i in self.every])[:TRIED]:

@@ -9,7 +9,7 @@ of the normal distributions that are cut off there; the mode by active sets, Noc
 Optimization, 16.5).
 
 Source: group selection with amplitude mixtures; the half-normal signs follow the priors that the effects state, and the
-widths together are nearly flat in the logarithm of a size, from a hundredth of the typical one to three: a calibrated
+widths, equally likely, are nearly flat in the logarithm of a size, from a hundredth of the typical one to three: a calibrated
 machine has of everything what its calibration could just not see, and of two causes that do the same the one whose typical
 size is larger is no less likely for it. Positive parameters enter by the posterior probability of their sign.
 """
@@ -29,7 +29,6 @@ from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.ground.datatypes import Floats, Ints
 
 PRIOR_WIDTHS = np.array([0.02, 0.1, 0.5, 2.5])
-_WEIGHTS = np.log([0.2, 0.25, 0.3, 0.25])
 FREE = 0.01  # precision of a cause while it is fitted: within 10 scales
 PASSES = 30  # of the search for columns at the end of their reach
 
@@ -114,7 +113,7 @@ def _log_bayes(at: Base, prior: Prior, index: Ints, cause: Ints) -> Floats:
     mean, narrow = at.mean[index], at.precision[index]
     inverse = np.linalg.inv(at.covariance[index[:, :, None], index[:, None]])
     h = (inverse @ mean[:, :, None])[:, :, 0]
-    sizes, weight = _widths(int(cause[-1]) + 1)
+    sizes = _widths(int(cause[-1]) + 1)
     wide = np.minimum(1.0 / sizes[:, cause] ** 2, narrow[:, None])  # a cause is at least as wide as its tolerance
     precision = inverse[:, None] + (wide - narrow[:, None])[..., None] * np.eye(len(cause))
     covariance, (sign, log_det) = np.linalg.inv(precision), np.linalg.slogdet(precision)
@@ -123,21 +122,16 @@ def _log_bayes(at: Base, prior: Prior, index: Ints, cause: Ints) -> Floats:
     posterior, spread = (covariance @ h[:, None, :, None])[..., 0], np.sqrt(np.maximum(variance, 1e-300))
     fit = np.where(proper, np.sum(h[:, None] * posterior, axis=2), -np.inf)
     none = np.log(narrow).sum(axis=1) - np.linalg.slogdet(inverse)[1] + np.sum(mean * h, axis=1)
-    value = 0.5 * (fit + np.log(wide).sum(axis=2) - log_det - none[:, None]) + weight
+    value = 0.5 * (fit + np.log(wide).sum(axis=2) - log_det - none[:, None])
     signed = prior.sign[index][:, None] > 0
     value += np.where(signed, log_ndtr(posterior / spread) + np.log(2.0), 0.0).sum(axis=2)
-    return np.asarray(logsumexp(value, axis=1), float)
-
-
-def _widths(count: int) -> tuple[Floats, Floats]:
-    """Widths (w, count) that so many causes may have, and the log weight (w,) of each."""
-    which = _choices(count, len(PRIOR_WIDTHS))
-    return PRIOR_WIDTHS[which], _WEIGHTS[which].sum(axis=1)
+    return np.asarray(logsumexp(value, axis=1) - np.log(len(sizes)), float)
 
 
 @cache
-def _choices(count: int, widths: int) -> Ints:
-    return np.array(list(product(range(widths), repeat=count)))
+def _widths(count: int) -> Floats:
+    """Widths (w, count) that so many causes may have, equally likely."""
+    return np.array(list(product(PRIOR_WIDTHS, repeat=count)))
 
 
 def estimate(data: NormalEquations, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
