@@ -176,6 +176,14 @@ def applies(effect: Any, robot: Any, target: str | None) -> bool:
     return not hasattr(effect, "applies") or bool(effect.applies(robot, target))
 
 
+def public_values(effect: Any, values: Mapping[str, float]) -> dict[str, float]:
+    """Values of the parameters that a file has, from those in which an effect is fitted; nominal where one is missing."""
+    if not hasattr(effect, "public"):
+        return dict(values)
+    fitted = {p.name: p.nominal for p in getattr(effect, "FITTED", effect.PARAMETERS)}
+    return dict(effect.public({**fitted, **values}))
+
+
 def nominal(effect: Any) -> dict[str, float]:
     """Parameter values at which the effect vanishes."""
     return {each.name: each.nominal for each in effect.PARAMETERS}

@@ -16,7 +16,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import PhysicsError
 from camcomp.ground.records import replace
 from camcomp.model.axes import axes_of
-from camcomp.model.effect import Cause, Load, Motion
+from camcomp.model.effect import Cause, Load, Motion, Parameter
 from camcomp.model.statics.description import Robot
 
 ORDER = (
@@ -36,6 +36,19 @@ _AT = dict(ORDER)
 def stages_of(effect: Any) -> set[str]:
     """The stages of the signal path at which an effect has hooks."""
     return {stage for stage, hooks in ORDER if any(hasattr(effect, hook) for hook in hooks)}
+
+
+def fitted_parameters(effect: Any, hinge: bool) -> tuple[Parameter, ...]:
+    """Parameters in which an effect is fitted on a hinge or a slide; none where it says nothing of such an actuator.
+
+    Angles of a hinge mean nothing to a slide, and lengths of a slide's drive nothing to a hinge.
+    """
+    own, rotary = getattr(effect, "FITTED", effect.PARAMETERS), getattr(effect, "ROTARY", None)
+    if not hinge:
+        return () if own == rotary else tuple(p for p in own if not p.unit.startswith("rad"))
+    if rotary is not None or getattr(effect, "SLIDES_ONLY", False):
+        return tuple(rotary or ())
+    return tuple(p for p in own if p.unit in ("1", "ppm") or "drive" not in stages_of(effect))
 
 
 def pushes(effect: Any) -> bool:

@@ -5,7 +5,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from camcomp.diagnosis.arm.poses import Poses
+from camcomp.diagnosis.arm.poses import ArmBench, Poses
 from camcomp.diagnosis.arm.study import studied
 from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.model.config.load import load_config
@@ -61,3 +61,14 @@ def test_a_slide_that_rolls_is_unknown_and_depends_on_where_it_stands(robot):
     result = answer(robot, rolling)
     first = result.where.drivers[0]
     assert (result.verdict, first.covariate) == ("unknown", "position:rail") and first.share > 0.8
+
+
+def test_it_warms_up_as_a_joint_does(robot):
+    still = run("a", 1, lambda at: (np.outer(at, [1, 0, 0]), np.zeros((ROWS, 3))))
+    columns = ArmBench(robot=robot, causes=(), campaigns=[still]).columns(ONLY)
+    grown = [
+        {each.shape for each in columns if (each.effect, each.target) == ("thermal_growth", name)}
+        for name in ("rail", "elbow")
+    ]
+    assert grown[0] == grown[1]
+    assert {shape[0][0] for shape in grown[0]} == {"warm_up_s"}

@@ -21,7 +21,7 @@ from camcomp.diagnosis.model.group import Group
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
-from camcomp.model.effect import Cause, Load, Motion, Parameter, applies
+from camcomp.model.effect import Cause, Load, Motion, Parameter, applies, nominal, public_values
 from camcomp.model.statics.arm import ARM_LENGTH, Arm, arm_of
 from camcomp.model.statics.description import Actuator, Link, Robot
 from camcomp.model.statics.hanging import Hung, grown_way, hang, tool_wrench
@@ -36,7 +36,9 @@ EffectShape = tuple[
 ]  # what shapes an effect: name, value, and between which values it lies
 _WRIST = {"joint_coupling": 2}  # effects of the last joints only: of how many
 # Effects of these hooks stand still, or are part of the registration.
-_UNSEEN = ("time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_lag", "backlash", "friction", "none")
+_UNSEEN = (
+    "time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_lag", "backlash", "friction", "inertia", "none",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -181,7 +183,7 @@ class ArmBench:
 
     def standing(self, campaign: Poses, causes: Sequence[Cause]) -> LoadedArm:
         """A campaign with causes on top of those of the config."""
-        causes = [replace(cause, values=complete(cause)) for cause in (*self.causes, *causes)]
+        causes = [complete(cause) for cause in (*self.causes, *causes)]
         robot, _ = signal_path.edited(causes, self.actuators, self.robot)
         motion = _standing(robot, campaign)
         motion = replace(motion, encoder=signal_path.controlled(causes, self.actuators, motion))
@@ -208,7 +210,7 @@ class ArmBench:
         found: list[Column] = []
         for name, module in shelf.usable("effects", (*_UNSEEN, *without)):
             for target in self._targets(name, module):
-                own = _for(module, self.drive(target or self.actuators[0]).revolute)
+                own = signal_path.fitted_parameters(module, self.drive(target or self.actuators[0]).revolute)
                 shapes: list[EffectShape] = [()]
                 if scanned := any(p.scan for p in own):
                     of_arm = hasattr(module, "on_drive") or hasattr(module, "on_links")
@@ -286,8 +288,7 @@ class ArmBench:
         for j in sorted(set(range(len(columns))) - set(waves)):
             module = columns[j].module
             if signal_path.stages_of(module) == {"drive"} and not signal_path.pushes(module) and j not in amounts:
-                cause = columns[j].cause(1.0)
-                cause = replace(cause, values=complete(cause))
+                cause = complete(columns[j].cause(1.0))
                 error, _ = signal_path.driven([cause], self.actuators, _standing(self.robot, campaign))
                 X[:, :, j] = np.einsum("nim,nm->ni", joints, error)
                 continue
@@ -333,7 +334,7 @@ def combined(columns: Sequence[Column], amounts: Mapping[int, float]) -> list[Ca
         one, key = column.cause(amount), (column.effect, column.target)
         values = {**merged[key].values, **one.values} if key in merged else one.values
         merged[key] = replace(one, values=values)
-    return [_public(cause) for cause in merged.values()]
+    return [replace(c, values=public_values(c.effect, c.values)) for c in merged.values()]
 
 
 def wave_motion(joints: Floats, actuators: Sequence[str], q: Floats, columns: Sequence[Column]) -> Floats:
@@ -369,23 +370,6 @@ def approached(q: Floats, time: Floats, least: float = 1e-4) -> Floats:
     return out
 
 
-def _public(cause: Cause) -> Cause:
-    """With the parameters that YAML has, where others are easier to fit."""
-    public = getattr(cause.effect, "public", None)
-    if public is None:
-        return cause
-    fitted = getattr(cause.effect, "FITTED", cause.effect.PARAMETERS)
-    return replace(cause, values=public({**{p.name: p.nominal for p in fitted}, **cause.values}))
-
-
-def _for(module: Any, turns: bool) -> tuple[Parameter, ...]:
-    rotary, own = getattr(module, "ROTARY", None), getattr(module, "FITTED", module.PARAMETERS)
-    own = (own if rotary is None else rotary) if turns else tuple(p for p in own if p not in (rotary or ()))
-    if turns and "drive" in signal_path.stages_of(module) and not hasattr(module, "ROTARY"):
-        own = tuple(p for p in own if p.unit == "ppm")  # lengths of a slide mean nothing to a hinge
-    return tuple(own)
-
-
 def _shapes(parameters: Sequence[Parameter], warm: bool) -> list[EffectShape]:
     """Shapes to try of an effect: times of warming up, or nothing where temperatures are logged; no shape of what is placed."""
     scanned = [p for p in parameters if p.scan]
@@ -398,9 +382,9 @@ def _shapes(parameters: Sequence[Parameter], warm: bool) -> list[EffectShape]:
     return [((one.name, ends[k], ends[k - 1], ends[k + 1]),) for k in range(1, len(ends) - 1)]
 
 
-def complete(cause: Cause) -> dict[str, float]:
-    """All parameters of a cause, nominal where none is given."""
-    return {**{p.name: p.nominal for p in cause.effect.PARAMETERS}, **cause.values}
+def complete(cause: Cause) -> Cause:
+    """The cause with all of its parameters, nominal where none is given."""
+    return replace(cause, values={**nominal(cause.effect), **cause.values})
 
 
 def _standing(robot: Robot, campaign: Poses) -> Motion:

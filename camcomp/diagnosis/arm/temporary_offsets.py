@@ -12,6 +12,7 @@ from camcomp.diagnosis.model.noise import IN_A_ROW
 from camcomp.diagnosis.model.window import best_window
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
+from camcomp.model.signal_path import fitted_parameters
 
 EFFECT = "disturbance"
 
@@ -42,8 +43,7 @@ def temporary_offsets(
             edges = [_between(time, begin), _between(time, end)]
             names = ("from_s", "to_s")
             shape = tuple((name, *edge) for name, edge in zip(names, edges, strict=True))
-            own = getattr(module, "ROTARY", module.PARAMETERS) if drive.revolute else module.FITTED
-            parameter = next(p for p in own if p.name.startswith("shift"))
+            parameter = next(p for p in fitted_parameters(module, drive.revolute) if p.name.startswith("shift"))
             found.append((Column(EFFECT, drive.name, module, parameter, shape), 0.5 * n * n * len(bench.own)))
     return found
 

@@ -21,7 +21,7 @@ from camcomp.diagnosis.model.noise import REPEATABILITY_MM
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model import signal_path
-from camcomp.model.effect import Cause, Motion, Parameter, applies
+from camcomp.model.effect import Cause, Motion, Parameter, applies, nominal, public_values
 from camcomp.model.hysteresis import direction
 from camcomp.model.law.covariates import AT_DRIVE, DriveRows
 from camcomp.model.law.expression import parse
@@ -89,11 +89,9 @@ class AxisCause:
 
     def cause(self, amounts: Sequence[float]) -> Cause:
         """The cause at amplitudes (d,)."""
-        nominal = {p.name: p.nominal for p in self.module.PARAMETERS}
         values = {p.name: p.value(a * p.scale) for p, a in zip(self.parameters, amounts, strict=True)}
-        values = {**{p.name: p.nominal for p in getattr(self.module, "FITTED", ())}, **self.shape, **values}
-        public = getattr(self.module, "public", None)
-        return Cause(self.effect, self.module, self.target, {**nominal, **(public(values) if public else values)})
+        own = public_values(self.module, {**self.shape, **values})
+        return Cause(self.effect, self.module, self.target, {**nominal(self.module), **own})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -227,7 +225,7 @@ def candidates(
             continue
         if not _acts(name, module, axes[0], channel):
             continue
-        own = parameters_of(module, actuator.revolute)
+        own = signal_path.fitted_parameters(module, actuator.revolute)
         linear = tuple(p for p in own if not p.shape)
         shapes = _shapes(module, own, axes, channel)
         fits = [(shape, linear) for shape in shapes if linear]
@@ -255,17 +253,6 @@ def _with_more_friction(
     more, slow = (known[name] for name in STRIBECK[hinge])
     out = [(shape, (*own, *drag)) for shape, own in fits for drag in ((), (viscous,), (viscous, asymmetry))]
     return out + [(shape | {slow.name: v}, (*own, viscous, more)) for shape, own in fits for v in slow.scan]
-
-
-def parameters_of(module: Any, hinge: bool) -> tuple[Parameter, ...]:
-    """Parameters of an effect that are fitted on a hinge or a slide; none where it says nothing of such an axis."""
-    if hinge and getattr(module, "SLIDES_ONLY", False) or not hinge and getattr(module, "ARM_ONLY", False):
-        return ()
-    own = tuple(getattr(module, "FITTED", module.PARAMETERS))
-    if hinge and not hasattr(module, "ROTARY") and "drive" in signal_path.stages_of(module):
-        own = tuple(p for p in own if p.unit == "1")  # lengths of a slide mean nothing to a hinge
-    own = tuple(module.ROTARY) if hinge and hasattr(module, "ROTARY") else own
-    return own
 
 
 def _acts(name: str, module: Any, axis: DrivenAxis, channel: ChannelName) -> bool:

@@ -13,10 +13,11 @@ import numpy as np
 
 from camcomp.diagnosis.fit.measured import Measured, stack
 from camcomp.ground.datatypes import Bools, Floats, Path
-from camcomp.model.effect import Cause, Parameter
+from camcomp.model.effect import Cause, Parameter, public_values
 from camcomp.model.motion.loaded_structure import Slopes, Solved, rows_together
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Reading, Twin
+from camcomp.model.signal_path import fitted_parameters
 from camcomp.model.statics.arm import ARM_LENGTH
 
 SHARE_OF_SCALE = 0.05  # step of a difference, or of the logarithm of a spring or a force
@@ -63,9 +64,7 @@ def fitted(candidate: CandidateCause) -> tuple[Parameter, ...]:
     effect = candidate.effect
     if hasattr(effect, "SOUGHT"):
         return tuple(effect.SOUGHT.get(candidate.target, ()))
-    own = getattr(effect, "FITTED", effect.PARAMETERS)
-    own = getattr(effect, "ROTARY", own) if candidate.hinge else own
-    return tuple(each for each in own if each.name not in candidate.without)
+    return tuple(p for p in fitted_parameters(effect, candidate.hinge) if p.name not in candidate.without)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -259,8 +258,7 @@ def means(values: Floats, ways: Floats, factor: int) -> Floats:
 def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cause:
     """The cause at fitting coordinates by parameter name; a missing coordinate takes its nominal value."""
     values = {p.name: p.value(coordinates.get(p.name, p.nominal if p.shape else 0.0)) for p in fitted(candidate)}
-    public = getattr(candidate.effect, "public", dict)  # what its file has, where others are easier to fit
-    return Cause(candidate.name, candidate.effect, candidate.target, public(values))
+    return Cause(candidate.name, candidate.effect, candidate.target, public_values(candidate.effect, values))
 
 
 def step_of(parameter: Parameter) -> float:

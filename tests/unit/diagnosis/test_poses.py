@@ -27,7 +27,7 @@ def test_the_spell_that_explains_most_is_that_of_all_windows_fitted_beside_the_f
         A = np.column_stack([F, spell])
         return np.sum((left.ravel() - A @ np.linalg.lstsq(A, left.ravel(), rcond=None)[0]) ** 2)
 
-    windows = [(i, j) for i in range(24) for j in range(i + 4, 25) if j - i <= 0.6 * 24]
+    windows = [(i, j) for i in range(24) for j in range(i + 4, 25) if j - i <= 0.5 * 24]
     best = min(windows, key=lambda w: left_over(*w))
     Q = np.linalg.qr(F)[0].reshape(24, 3, 9)
     assert best_window(joint, left, Q, np.arange(25), 4)[1:] == best
