@@ -105,7 +105,7 @@ def fit_process(groups: Sequence[Group], left: Sequence[Floats], over: str) -> S
     for g, r in zip(groups, left, strict=True):
         if (g.order if over == "time" else g.position) is None:
             return None
-        at = g.positions(SmoothProcess(0.0, 1.0, over))
+        at = g.positions(over)
         region = split_regions(at, -(-len(r) // ROWS_OF_PROCESS))
         parts += [(at[region == i], r[region == i]) for i in np.unique(region)]
     values = sum(r.size for _, r in parts)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import norm
 
 from camcomp.diagnosis.model.evidence import Background, LinearModel, Members
-from camcomp.diagnosis.model.group import SmoothProcess, split_regions
+from camcomp.diagnosis.model.group import split_regions
 from camcomp.diagnosis.model.noise import AT_FLOOR
 from camcomp.diagnosis.statistics.places import FALSE
 from camcomp.ground.datatypes import Floats
@@ -90,7 +90,7 @@ def excess_of(model: LinearModel, parts: Sequence[HeldOut], freedom: float = np.
     total, count = [], []
     for part in parts:
         group = model.groups[part.group]
-        at = group.positions(SmoothProcess(0.0, 1.0, "posture" if group.position is not None else "time"))
+        at = group.positions("posture" if group.position is not None else "time")
         region = split_regions(at, min(REGIONS, max(len(part.squares) // 4, 2)))
         values = np.isfinite(group.y).sum(axis=1)
         for i in np.unique(region):

@@ -1,8 +1,7 @@
 """A run or campaign as rows of the model, and the normal equations of all groups.
 
 y_g = A_g a_S + N_g b_g + B_g w + e_g,  e_g ~ N(0, R_g): g is the unit that is left out. R_g is a standard deviation per
-row and channel, correlated from row to row by AR(1) where the channel has a memory, or by a smooth process over the
-positions of the rows.
+row and channel, correlated by a smooth process over the positions of the rows where there is one.
 """
 
 from __future__ import annotations
@@ -41,9 +40,8 @@ class Group:
 
     y (n, c): measured minus modelled, NaN where a channel has no value. A (n, c, k): motion of the channels per unit of an
     amplitude. N (n, c, p): nuisances; groups with the same `label` share their amplitudes. sd (n, c): noise, resolution
-    included. B: covariate -> (n, c, q), smooth functions of it of size 1. memory (c,): AR(1) coefficient of the noise of
-    successive rows, None where rows are independent. position (n, f): what makes rows neighbours; order (n,): 0 to 1 in
-    time, None where rows have no clock.
+    included. B: covariate -> (n, c, q), smooth functions of it of size 1. position (n, f): what makes rows neighbours;
+    order (n,): 0 to 1 in time, None where rows have no clock.
     """
 
     name: str
@@ -53,7 +51,6 @@ class Group:
     N: Floats
     sd: Floats
     B: Mapping[str, Floats] = field(default_factory=dict)
-    memory: Floats | None = None
     position: Floats | None = None
     order: Floats | None = None
 
@@ -62,38 +59,27 @@ class Group:
         position, order = (None if each is None else each[rows] for each in (self.position, self.order))
         return Group(
             name=self.name, label=self.label, y=self.y[rows], A=self.A[rows], N=self.N[rows], sd=self.sd[rows],
-            B={name: each[rows] for name, each in self.B.items()}, memory=self.memory, position=position, order=order,
+            B={name: each[rows] for name, each in self.B.items()}, position=position, order=order,
         )  # fmt: skip
 
-    def whiten(self, D: Floats, process: SmoothProcess | None = None) -> Floats:
-        """Columns D (n, c, q) as (n c, q) in which the noise is white and of size 1; rows without a value are 0."""
+    def whiten(self, D: Floats, process: SmoothProcess | None = None) -> tuple[Floats, float]:
+        """Columns D (n, c, q) as (n c, q) in which the noise is white and of size 1, rows without a value 0, and the
+        logarithm of the size that the noise had: sum of log sd, and of the process where there is one.
+        """
         seen = np.isfinite(self.y) & np.isfinite(self.sd)
         white = np.where(seen[:, :, None], D / np.where(seen, self.sd, 1.0)[:, :, None], 0.0)
-        if self.memory is not None:
-            own = self.memory[None, :, None]
-            white[1:] = (white[1:] - own * white[:-1]) / np.sqrt(1.0 - own**2)
-        elif process is not None and process.size > 0.0:
-            K = process.correlation(self.positions(process)) + np.eye(len(white))
-            flat = solve_triangular(cholesky(K, lower=True), white.reshape(len(white), -1), lower=True)
-            white = flat.reshape(white.shape)
-        return np.asarray(white.reshape(-1, white.shape[2]), float)
+        log_size = float(np.log(self.sd[seen]).sum())
+        if process is not None:
+            K = process.correlation(self.positions(process.over)) + np.eye(len(white))
+            half = cholesky(K, lower=True)
+            white = solve_triangular(half, white.reshape(len(white), -1), lower=True).reshape(white.shape)
+            log_size += self.y.shape[1] * float(np.log(np.diag(half)).sum())
+        return np.asarray(white.reshape(-1, white.shape[2]), float), log_size
 
-    def log_size(self, process: SmoothProcess | None = None) -> float:
-        """Logarithm of the density's denominator: sum of log sd, and of the process where there is one."""
-        seen = np.isfinite(self.y) & np.isfinite(self.sd)
-        out = float(np.log(self.sd[seen]).sum())
-        if self.memory is not None:
-            out += 0.5 * float((np.log1p(-(self.memory**2)) * np.maximum(seen.sum(axis=0) - 1, 0)).sum())
-        elif process is not None and process.size > 0.0:
-            K = process.correlation(self.positions(process)) + np.eye(len(self.y))
-            out += self.y.shape[1] * float(np.log(np.diag(cholesky(K, lower=True))).sum())
-        return out
-
-    def positions(self, process: SmoothProcess) -> Floats:
-        """Positions (n, f) that a process goes by."""
-        if process.over == "time":
-            return np.zeros((len(self.y), 1)) if self.order is None else self.order[:, None]
-        return np.zeros((len(self.y), 1)) if self.position is None else self.position
+    def positions(self, over: str) -> Floats:
+        """Positions (n, f) that a process over `posture` or `time` goes by."""
+        at = self.position if over == "posture" else None if self.order is None else self.order[:, None]
+        return np.zeros((len(self.y), 1)) if at is None else at
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,9 +126,9 @@ def normal_equations(
     """Normal equations of one group, of some columns or all."""
     D = layout.design(g)
     D = np.concatenate([D if columns is None else D[:, :, columns], np.nan_to_num(g.y)[:, :, None]], axis=2)
-    white = g.whiten(D, process)
+    white, log_size = g.whiten(D, process)
     own, y = white[:, :-1], white[:, -1]
-    return NormalEquations(own.T @ own, own.T @ y, float(y @ y), int(np.isfinite(g.y).sum()), g.log_size(process))
+    return NormalEquations(own.T @ own, own.T @ y, float(y @ y), int(np.isfinite(g.y).sum()), log_size)
 
 
 def split_regions(positions: Floats, count: int) -> np.ndarray:

@@ -22,7 +22,7 @@ from tests.validation.calibration import fit_map
 SD = 0.02
 
 
-def model(rng, amounts=(), more=None, groups=2, n=60, sd=SD, memory=None, seen=SD):
+def model(rng, amounts=(), more=None, groups=2, n=60, sd=SD, seen=SD):
     """Groups with columns sin(k x), constants as nuisances, and one covariate; more(x): what no column is."""
     out = []
     for g in range(groups):
@@ -34,7 +34,7 @@ def model(rng, amounts=(), more=None, groups=2, n=60, sd=SD, memory=None, seen=S
         out.append(
             Group(
                 name=f"run {g}", label=g, y=y[:, None], A=A, N=np.full((n, 1, 1), 1e-3), sd=np.full((n, 1), sd), B=B,
-                position=x[:, None], order=np.linspace(0.0, 1.0, n), memory=memory,
+                position=x[:, None], order=np.linspace(0.0, 1.0, n),
             )
         )  # fmt: skip
     free = SimpleNamespace(low=-10.0, high=10.0, scale=1.0, log=False, sign=0, coordinate=lambda v: v)
@@ -126,16 +126,6 @@ def test_the_same_column_twice_is_one_class():
     found = explain(LinearModel(groups=tuple(twins), candidates=m.candidates, bounds=m.bounds), KnownNoise())
     assert len(found.members) == 1
     assert len(alternatives_of(found, [c.place for c in m.candidates])) == 4
-
-
-def test_memory_of_rows_is_taken_out():
-    rng = np.random.default_rng(7)
-    noise = np.zeros(4000)
-    for i in range(1, len(noise)):
-        noise[i] = 0.8 * noise[i - 1] + rng.normal(0.0, SD * 0.6)
-    m = model(rng, n=4000, groups=1, memory=np.array([0.8]))
-    white = m.groups[0].whiten(noise[:, None, None])
-    assert white[1:].std() == pytest.approx(1.0, rel=0.05)
 
 
 def test_noise_of_a_recording():
