@@ -18,6 +18,7 @@ PARAMETERS = (
         "gear joints of arms of 10 to 250 kg payload: 3e-10 to 1e-7 rad/(N mm)", sign=1,
     ),
 )  # fmt: skip
+ROTARY = PARAMETERS
 
 
 def on_robot(robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -> Robot:

@@ -41,11 +41,11 @@ def stages_of(effect: Any) -> set[str]:
 def fitted_parameters(effect: Any, hinge: bool) -> tuple[Parameter, ...]:
     """Parameters in which an effect is fitted on a hinge or a slide; none where it says nothing of such an actuator.
 
-    Angles of a hinge mean nothing to a slide, and lengths of a slide's drive nothing to a hinge.
+    Lengths of a slide's drive mean nothing to a hinge.
     """
     own, rotary = getattr(effect, "FITTED", effect.PARAMETERS), getattr(effect, "ROTARY", None)
     if not hinge:
-        return () if own == rotary else tuple(p for p in own if not p.unit.startswith("rad"))
+        return () if own == rotary else tuple(own)
     if rotary is not None or getattr(effect, "SLIDES_ONLY", False):
         return tuple(rotary or ())
     return tuple(p for p in own if p.unit in ("1", "ppm") or "drive" not in stages_of(effect))

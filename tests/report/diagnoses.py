@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from camcomp.diagnosis.report.run_view import RivalSignals, RunView
+from camcomp.diagnosis.report.run_view import RunView
 from camcomp.diagnosis.result.types import DiagnosisResult
 
 
@@ -14,13 +14,11 @@ def run_view(name, held_out, *, size=20.0, left=2.0, seed=0, frequency=0.5):
     position = np.column_stack((25 * np.cos(angle), 25 * np.sin(angle), np.zeros_like(t)))
     noise = rng.normal(0, 0.5, (len(t), 3))
     swing = np.column_stack((np.sin(2 * np.pi * frequency * t), *np.zeros((2, len(t)))))
-    line = np.where(t < 10, 8.0, 9.0)
     channels = ("tip x", "tip y", "tip z")
     return RunView(
         name=name,
         held_out=held_out,
         time=t,
-        line=line,
         position=position,
         before=size * swing + noise,
         after=left * swing + noise,
@@ -82,13 +80,4 @@ def views():
         run_view("a", True),
         run_view("b", True, size=30.0, seed=1, frequency=1.25),
         run_view("c", False, size=90.0, seed=2),
-    ]
-
-
-def rivals():
-    """Two sets that do nearly the same."""
-    one = [view.before - view.after for view in views()]
-    return [
-        RivalSignals("backlash (x)", tuple(one)),
-        RivalSignals("friction (x) and gravity", tuple(1.1 * each + 0.2 for each in one)),
     ]

@@ -26,7 +26,6 @@ def view(name, *, clockwise, radial, rows=1441, cutting=False):
         name=name,
         held_out=False,
         time=np.abs(told),
-        line=np.full(rows, 4.0),
         position=at,
         before=gap,
         after=0.0 * gap,

@@ -12,22 +12,21 @@ import pytest
 
 from camcomp.diagnosis.report.figures import figure_map, figure_signed, figure_size
 from camcomp.diagnosis.report.page import diagnosis_html, verdict_text
-from camcomp.diagnosis.report.run_view import RivalSignals, likeness, rms
+from camcomp.diagnosis.report.run_view import rms
 from camcomp.diagnosis.result.types import DiagnosisResult
 from camcomp.report.inputs import Input
 from camcomp.report.page import Listing
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 from tests.report.browser import needs_browser
-from tests.report.diagnoses import result, rivals, run_view, views
+from tests.report.diagnoses import result, run_view, views
 
 VERDICTS = ("none", "identified", "ambiguous", "unknown")
 
 
 def html_of(verdict, **more):
     made = diagnosis_html(
-        result(verdict), views(), title="e.yaml", machine="Orthoglide",
-        rivals=rivals() if verdict == "ambiguous" else (), **more,
+        result(verdict), views(), title="e.yaml", machine="Orthoglide", **more,
     )  # fmt: skip
     return made.decode()
 
@@ -136,10 +135,7 @@ def test_vibrations_stand_in_a_table():
     assert "z 12.5 4.20 31.0 %" in words(html)
 
 
-def test_likeness():
-    one = np.array([[1.0, 0.0], [np.nan, 0.0]])
-    assert likeness(RivalSignals("a", (one,)), RivalSignals("b", (-3 * one,))) == pytest.approx(1.0)
-    assert likeness(RivalSignals("a", (one,)), RivalSignals("b", (one[:, ::-1],))) == 0.0
+def test_rows_without_a_value_do_not_count():
     assert rms(np.array([np.nan, 3.0, -3.0])) == 3.0 and rms(np.array([np.nan])) == 0.0
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.diagnosis.report.run_view import RivalSignals, RunView, likeness, rms
+from camcomp.diagnosis.report.run_view import RunView, rms
 from camcomp.diagnosis.report.words import percent
 from camcomp.diagnosis.result.types import UnseenShrinkage, Where
 from camcomp.report.plot import (
@@ -167,25 +167,4 @@ def figure_shares(where: Where) -> Figure | None:
         traces=[bars],
         layout={"xaxis": axis("share in %", range=[0, 115]), "yaxis": axis(""), "margin": BAR_MARGIN},
         height=120 + 26 * len(rows),
-    )
-
-
-def figure_rivals(rivals: Sequence[RivalSignals], views: Sequence[RunView]) -> Figure | None:
-    """Signals of indistinguishable sets of causes in the run in which they are largest."""
-    if len(rivals) < 2 or not views:
-        return None
-    k = int(np.argmax([rms(np.linalg.norm(each, axis=1)) for each in rivals[0].signals]))
-    c = int(np.argmax(np.nanstd(rivals[0].signals[k], axis=0)))
-    view = views[k]
-    index = thin(np.column_stack([each.signals[k][:, c] for each in rivals]))
-    x = numbers(view.time[index], 4)
-    curves = [line(each.name, x, numbers(each.signals[k][index, c], 3), i) for i, each in enumerate(rivals[:6])]
-    alike = ", ".join(f"{each.name} {100 * likeness(rivals[0], each):.1f} %" for each in rivals[1:])
-    return Figure(
-        name="rivals",
-        title="Why they cannot be told apart",
-        caption=f"What each set of causes does to {view.channels[c]} in run {view.name}. Likeness with {rivals[0].name} over all "
-        f"runs: {alike}.",
-        traces=curves,
-        layout={"xaxis": axis("time in s"), "yaxis": axis("signal in µm", zerolinecolor=INK)},
     )

@@ -10,14 +10,13 @@ from camcomp.diagnosis.report.circles import circles_section
 from camcomp.diagnosis.report.figures import (
     figure_ladder,
     figure_map,
-    figure_rivals,
     figure_shares,
     figure_signed,
     figure_size,
 )
 from camcomp.diagnosis.report.joints import joints_section
 from camcomp.diagnosis.report.law_section import LawView, law_section
-from camcomp.diagnosis.report.run_view import MOST_DRAWN, RivalSignals, RunView, rms
+from camcomp.diagnosis.report.run_view import MOST_DRAWN, RunView, rms
 from camcomp.diagnosis.report.standards import standards_section
 from camcomp.diagnosis.report.words import cell, percent, plain, remedy, sizes
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, NextExperiment, UnseenShrinkage, Where
@@ -50,14 +49,12 @@ def diagnosis_html(
     machine: str,
     inputs: Sequence[Input] = (),
     notes: Sequence[str] = (),
-    rivals: Sequence[RivalSignals] = (),
     next_program: Listing | None = None,
     law: LawView | None = None,
 ) -> bytes:
     """One HTML file. result: of any kind of study; views: runs to draw, withheld ones first.
 
-    rivals: sets of causes that explain the logs equally well, the most probable first, with their signals in the runs of
-    `views`. next_program: file of the proposed experiment. law: residuals explained by the law of an unknown effect.
+    next_program: file of the proposed experiment. law: residuals explained by the law of an unknown effect.
     Raises ConfigError CC216 without the plot library.
     """
     seen = [view for view in views if view.held_out] or list(views)
@@ -69,7 +66,7 @@ def diagnosis_html(
         circles_section(views, result.standards.circles),
         _causes(result),
         None if result.law is None else law_section(result.law, law),
-        _apart(result, rivals, views) if len(result.alternatives) > 1 else None,
+        _apart(result) if len(result.alternatives) > 1 else None,
         _shrinkage(result.shrinkage, floor) if result.shrinkage and result.shrinkage.steps else None,
         joints_section(result),
         *_gap_of_runs(seen, floor),
@@ -144,16 +141,9 @@ def _causes(result: DiagnosisResult) -> Section:
     )
 
 
-def _apart(result: DiagnosisResult, rivals: Sequence[RivalSignals], views: Sequence[RunView]) -> Section:
+def _apart(result: DiagnosisResult) -> Section:
     items = [listed([each.label for each in one]) for one in result.alternatives]
-    figure = figure_rivals(rivals, views)
-    return Section(
-        name="apart",
-        title="What cannot be told apart, and why",
-        text=[INDISTINGUISHABLE_TEXT],
-        figures=[figure] if figure else [],
-        items=items,
-    )
+    return Section(name="apart", title="What cannot be told apart, and why", text=[INDISTINGUISHABLE_TEXT], items=items)
 
 
 def _shrinkage(shrink: UnseenShrinkage, floor: float | None) -> Section:

@@ -15,7 +15,7 @@ MOST_DRAWN = 4  # runs, or circles, with figures of their own
 class RunView:
     """Rows (n,) of one run. before, after: measured minus modelled (n, c) um, without and with the causes found.
 
-    time (n,) s; line (n,) source line, NaN where unknown; position (n, 3) mm modelled tip in the program frame; channels:
+    time (n,) s; position (n, 3) mm modelled tip in the program frame; channels:
     names of the c columns. held_out: the causes were fitted without this run. NaN for unmeasured values.
     commanded (n, 3): tip of the set-points, program frame; program: path of the program; cutting: any row was under a
     cutting force.
@@ -24,7 +24,6 @@ class RunView:
     name: str
     held_out: bool
     time: Floats
-    line: Floats
     position: Floats
     before: Floats
     after: Floats
@@ -55,25 +54,7 @@ class RunView:
         return np.concatenate(([0.0], np.cumsum(np.where(np.isfinite(step), step, 0.0))))
 
 
-@dataclass(frozen=True, eq=False)
-class RivalSignals:
-    """A set of causes indistinguishable from the first one: its name, and its signal (n, c) um in each run."""
-
-    name: str
-    signals: tuple[Floats, ...]
-
-
 def rms(size: Floats) -> float:
     """Root mean square of the finite values; 0 without any."""
     known = size[np.isfinite(size)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else 0.0
-
-
-def likeness(one: RivalSignals, other: RivalSignals) -> float:
-    """Similarity of the signals of two sets of causes: 1: proportional, 0: orthogonal."""
-    a = np.concatenate([each.ravel() for each in one.signals])
-    b = np.concatenate([each.ravel() for each in other.signals])
-    known = np.isfinite(a) & np.isfinite(b)
-    a, b = a[known], b[known]
-    size = float(np.linalg.norm(a) * np.linalg.norm(b))
-    return float(abs(a @ b) / size) if size > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Data of a diagnosis for its report: gap of every run before and after, and signals of rival sets of causes."""
+"""Data of a diagnosis for its report: gap of every run before and after, and what a law explains."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from camcomp.diagnosis.law.answer import LawAnswer, rms_um, term_bench
 from camcomp.diagnosis.law.bench_terms import Spot
 from camcomp.diagnosis.report.law_section import LawView
 from camcomp.diagnosis.report.page import diagnosis_html
-from camcomp.diagnosis.report.run_view import RivalSignals, RunView
-from camcomp.diagnosis.result.types import DiagnosisResult, NamedCause
+from camcomp.diagnosis.report.run_view import RunView
+from camcomp.diagnosis.result.types import DiagnosisResult
 from camcomp.ground.files import read_bytes
 from camcomp.model.config.load import ExperimentFile
 from camcomp.model.effect import Cause
@@ -47,14 +47,10 @@ def report_of(
         if run.program is not None:
             inputs.append(Input(f"program of {run.name}", run.program, read_bytes(run.program)))
         inputs.append(Input(f"log of {run.name}", run.log, read_bytes(run.log)))
-    views: list[RunView] = []
-    rivals: list[RivalSignals] = []
-    if done is not None and opened is not None:
-        views = views_of(done)
-        rivals = rivals_of(done)
+    views = views_of(done) if done is not None and opened is not None else []
     return diagnosis_html(
         result, views, title=PurePath(file.path).name, machine=file.config.robot.name, inputs=inputs,
-        notes=opened.notes if opened is not None else (), rivals=rivals, next_program=next_program,
+        notes=opened.notes if opened is not None else (), next_program=next_program,
         law=_law_view(done.problem, done.law) if done is not None and done.law is not None else None,
     )  # fmt: skip
 
@@ -71,23 +67,6 @@ def views_of(done: Diagnosis) -> list[RunView]:
     return [*(_view(problem, problem.bench, k, done.causes, held_out=False) for k in fitted), *judged]
 
 
-def rivals_of(done: Diagnosis) -> list[RivalSignals]:
-    """Indistinguishable sets of causes, the best one first; empty for a single set."""
-    found, problem = done.search, done.problem
-    if done.result.verdict != "ambiguous":
-        return []
-    part = main_channels(problem)
-    out = []
-    for fit in (found.sets.best, *(found.sets.fits[j] for j in found.sets.rivals)):
-        causes = problem.causes(fit.members, fit.theta, fit.extra)
-        names = [NamedCause(effect=each.name, target=each.target).label for each in causes]
-        signals = tuple(
-            1e3 * (problem.bench.gap(k) - problem.bench.gap(k, causes))[:, part] for k in range(len(problem.bench.runs))
-        )
-        out.append(RivalSignals(" and ".join(names), signals))
-    return out
-
-
 def _view(problem: Problem, bench: Bench, k: int, causes: Sequence[Cause], *, held_out: bool) -> RunView:
     part, run = main_channels(problem), bench.runs[k]
     before = bench.gap(k)
@@ -98,7 +77,6 @@ def _view(problem: Problem, bench: Bench, k: int, causes: Sequence[Cause], *, he
         name=run.name,
         held_out=held_out,
         time=thinned(run.run_path.time, run.thin),
-        line=thinned(run.measured.line, run.thin),
         position=thinned(bench.nominal[k].tip, run.thin),
         before=1e3 * before[:, part],
         after=1e3 * after[:, part],
