@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class Turn:
     angle: Floats
 
     @property
-    def way(self) -> str:
+    def way(self) -> Literal["counter-clockwise", "clockwise"]:
         """The direction in words."""
         return "counter-clockwise" if self.counter_clockwise else "clockwise"
 

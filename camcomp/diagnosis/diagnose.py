@@ -35,6 +35,7 @@ from camcomp.diagnosis.result.types import (
     Estimate,
     Floor,
     FoundCause,
+    FrequencyLine,
     GapSize,
     NamedCause,
     NextExperiment,
@@ -49,7 +50,7 @@ from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies
+from camcomp.diagnosis.statistics.periods import frequencies
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.progress import part as part_of_work
@@ -297,10 +298,7 @@ def _where(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer | 
         "lines": places.lines(gaps),
         "intervals": places.intervals(left),
         "drivers": _drivers(problem, found, heard),
-        "frequencies": [
-            {"axis": f.name, "hertz": round(f.hertz, 4), "amplitude_um": round(1e3 * f.amplitude, 3), "share": round(f.share, 4)}
-            for f in heard
-        ],
+        "frequencies": heard,
     })  # fmt: skip
 
 
@@ -327,11 +325,11 @@ def _stage(problem: Problem, best: Fitted, found: CauseSearch, law: LawAnswer | 
     return max(size, key=lambda each: size[each])
 
 
-def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[SpectralLine]) -> list[Driver]:
+def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[FrequencyLine]) -> list[Driver]:
     """Covariates of the gap; with an unknown cause, covariates of the residual."""
     if found.unknown_in:
         # a vibration of one frequency depends on time alone
-        lines = tuple((f"time:{line.name}", line.share) for line in heard)
+        lines = tuple((f"time:{line.axis}", line.share) for line in heard)
         labels = tuple(sorted((*lines, *found.left[found.unknown_in]), key=lambda each: -each[1]))
     else:
         null = problem.refit(())

@@ -38,35 +38,26 @@ class _Stop:
     off: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Round:
-    """A circle in one direction in one run, with how far its radius is off, um at every degree (360,)."""
-
-    run: str
-    turn: Turn
-    off: Floats
-
-
 def of_runs(twin: Twin, runs: Sequence[Run]) -> StandardValues:
     """What runs with programs hold of ISO 230-2 and ISO 230-4."""
     lines: dict[tuple[int, tuple[float, ...]], list[_Stop]] = {}
-    rounds: dict[tuple[str, bool], list[_Round]] = {}
+    rounds: dict[tuple[str, bool], list[tuple[CircularTurn, Floats]]] = {}
     for run in runs:
         path, tip = run.run_path, run.measured.tip
         if run.turn is not None:
             continue
-        told = twin.to_program(path.row_place.of(path.node_tip) if path.driven is None else path.driven.tip)
+        told = run.commanded(twin)
         loaded = bool(np.any(path.row_force))
         if run.program is not None:
             for turn in turns_of(run.program, told, tip):
-                rounds.setdefault((turn.circle.name, loaded), []).append(_Round(run.name, turn, turn.off(tip)))
+                rounds.setdefault((turn.circle.name, loaded), []).append(_circular_turn(run.name, turn, tip))
         if loaded:
             continue
         for stop in stops(told, tip):
             beside = np.delete(np.round(stop.target / REPEATABILITY_MM) * REPEATABILITY_MM, stop.axis)
             lines.setdefault((stop.axis, tuple(beside + 0.0)), []).append(stop)
     found = [each for (axis, beside), own in lines.items() if (each := _positioning(axis, beside, own)) is not None]
-    circles = tuple(_circular(name, loaded, own) for (name, loaded), own in rounds.items())
+    circles = tuple(_circular_test(name, loaded, own) for (name, loaded), own in rounds.items())
     absent = ((NO_STOPS,) if not found else ()) + ((NO_CIRCLES,) if not circles else ())
     return StandardValues(positioning=tuple(found), circles=circles, absent=absent)
 
@@ -88,26 +79,19 @@ def stops(commanded: Floats, tip: Floats) -> Iterator[_Stop]:
         yield _Stop(axis, commanded[end], bool(way[axis] > 0.0), off)
 
 
-def _circular(circle: str, loaded: bool, rounds: Sequence[_Round]) -> CircularTest:
+def _circular_turn(run: str, turn: Turn, tip: Floats) -> tuple[CircularTurn, Floats]:
+    """Values of a circle in one direction in one run, and its points (360, 2) mm."""
+    off = turn.off(tip)
+    shape = points(turn.circle, off)
+    size = _um(1e3 * circular_deviation([shape]))
+    return CircularTurn(run=run, direction=turn.way, G_um=size, F_max_um=_um(off.max()), F_min_um=_um(off.min())), shape
+
+
+def _circular_test(circle: str, loaded: bool, rounds: Sequence[tuple[CircularTurn, Floats]]) -> CircularTest:
     """Values of a circle that was driven under one load."""
-    shapes = [points(each.turn.circle, each.off) for each in rounds]
-    return CircularTest(
-        circle=circle,
-        cutting=loaded,
-        turns=tuple(
-            CircularTurn(
-                run=each.run,
-                direction="counter-clockwise" if each.turn.counter_clockwise else "clockwise",
-                G_um=_um(1e3 * circular_deviation([shape])),
-                F_max_um=_um(each.off.max()),
-                F_min_um=_um(each.off.min()),
-            )
-            for each, shape in zip(rounds, shapes, strict=True)
-        ),
-        G_both_um=_um(1e3 * circular_deviation(shapes))
-        if len({each.turn.counter_clockwise for each in rounds}) == 2
-        else None,
-    )
+    turns, shapes = zip(*rounds, strict=True)
+    both = _um(1e3 * circular_deviation(shapes)) if len({turn.direction for turn in turns}) == 2 else None
+    return CircularTest(circle=circle, cutting=loaded, turns=turns, G_both_um=both)
 
 
 def _um(value: float) -> float:

@@ -12,7 +12,7 @@ from camcomp.diagnosis.fit.bench import Bench
 from camcomp.diagnosis.next_experiment.candidates import by_other_means, candidate, coarse, single_changes, usual
 from camcomp.diagnosis.next_experiment.design import MotionDesign
 from camcomp.diagnosis.next_experiment.ready_program import CUTS, ready_program
-from camcomp.diagnosis.next_experiment.site import commanded, site_of
+from camcomp.diagnosis.next_experiment.site import site_of
 from camcomp.gcode.interpret import read_program
 from camcomp.ground import path_geometry
 from camcomp.ground.errors import CheckFailed
@@ -79,8 +79,8 @@ def test_linuxcnc_reads_them(proposals):
 def test_in_the_air_nothing_is_met_that_the_runs_did_not_pass(bench, every):
     """Designs in the air stay above the lowest run in the air; designs that cut stay where the runs cut."""
     runs = dict(zip(("cut", "air"), bench.runs, strict=True))
-    lowest = commanded(bench, runs["air"])[:, 2].min()
-    been = commanded(bench, runs["cut"])
+    lowest = runs["air"].commanded(bench.twin)[:, 2].min()
+    been = runs["cut"].commanded(bench.twin)
     for each in every:
         ends = each.design.points()
         if each.cutting:

@@ -179,7 +179,7 @@ def test_in_a_browser(browser, tmp_path, verdict):
         "return [...document.querySelectorAll('.plot')].map(p => [p.id, p.dataset.drawn,"
         " p.querySelectorAll('path.js-line, .bars path, path.point').length])"
     )
-    assert len(drawn) == {"none": 6, "identified": 7, "ambiguous": 8, "unknown": 7}[verdict]
+    assert len(drawn) == {"none": 6, "identified": 7, "ambiguous": 7, "unknown": 7}[verdict]
     for name, done, marks in drawn:
         assert done == "yes" and marks, name
     assert browser.console() == []

@@ -41,14 +41,14 @@ def shrinkage_of(problem: Problem, best: Fitted, seen: Bench, chosen: Sequence[M
     )  # fmt: skip
 
 
-def _nuisances(seen: Bench, fitted: Sequence[Run], part: slice) -> tuple[list[Floats], list[str]]:
-    """Columns (per run (n, c, k)) and names of the nuisances that only held-out runs determine: the workpiece frame of
+def _nuisances(seen: Bench, fitted: Sequence[Run], part: slice) -> tuple[list[list[Floats]], list[str]]:
+    """Columns, per run (n, c), and names of the nuisances that only held-out runs determine: the workpiece frame of
     another clamping and the offset of another clock.
     """
-    blocks = [np.zeros((len(run.run_path.time) // run.thin, part.stop - part.start, 0)) for run in seen.runs]
+    found: list[list[Floats]] = []
     named: list[str] = []
     if part.start != 0:
-        return blocks, named
+        return found, named
     for label, what in (("clamping", "workpiece frame"), ("clock", "clock offset")):
         effect = EFFECT_OF[label]
         every = [getattr(run, label) for run in (*fitted, *seen.runs)]
@@ -57,21 +57,18 @@ def _nuisances(seen: Bench, fitted: Sequence[Run], part: slice) -> tuple[list[Fl
             continue
         columns = candidate_columns(seen, CandidateCause(effect, None, shelf.load("effects", effect)), {})
         for other in others:
-            mine = [k for k, run in enumerate(seen.runs) if getattr(run, label) == other]
-            named += [f"{what} of {seen.runs[k].name} ({label} {other})" for k in mine]
-            for column in columns:
-                for k in range(len(blocks)):
-                    one = column[k][:, part] if k in mine else np.zeros_like(column[k][:, part])
-                    blocks[k] = np.concatenate([blocks[k], one[:, :, None]], axis=2)
-    return blocks, named
+            mine = [getattr(run, label) == other for run in seen.runs]
+            named += [f"{what} of {run.name} ({label} {other})" for run, on in zip(seen.runs, mine, strict=True) if on]
+            found += [[on * own[:, part] for own, on in zip(each, mine, strict=True)] for each in columns]
+    return found, named
 
 
-def _without(gaps: Sequence[Floats], free: Sequence[Floats]) -> list[Floats]:
+def _without(gaps: Sequence[Floats], free: Sequence[Sequence[Floats]]) -> list[Floats]:
     """Gaps minus their least-squares fit by the free columns, over all runs together."""
-    if not free or free[0].shape[2] == 0:
+    if not free:
         return list(gaps)
-    r = np.concatenate([gap.ravel() for gap in gaps])
-    D = np.concatenate([block.reshape(-1, block.shape[2]) for block in free])
-    known = np.isfinite(r)
-    a = np.linalg.lstsq(D[known], r[known], rcond=1e-9)[0]
-    return [gap - block @ a for gap, block in zip(gaps, free, strict=True)]
+    every = np.concatenate(gaps)
+    columns = np.stack([np.concatenate(each) for each in free], axis=2)
+    known = np.isfinite(every)
+    left = every - columns @ np.linalg.lstsq(columns[known], every[known], rcond=1e-9)[0]
+    return np.split(left, np.cumsum([len(gap) for gap in gaps])[:-1])

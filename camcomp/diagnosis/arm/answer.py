@@ -48,7 +48,7 @@ def causes(case: PoseCase) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, .
         size = 1e3 * float(np.sqrt(energy / rows))
         if case.floor is not None and size < MINOR * case.floor.um:
             if size >= HEALTHY * case.floor.um:
-                minor.append(MinorEffect(effect=part.effect, target=part.target, size_um=_round(size)))
+                minor.append(MinorEffect(effect=part.effect, target=part.target, size_um=round(size, 3)))
             continue
         cause = FoundCause(
             effect=part.effect,
@@ -222,7 +222,3 @@ def _intervals(case: PoseCase) -> tuple[IntervalShare, ...]:
 def _size(parts: Sequence[Floats]) -> float:
     every = np.concatenate(list(parts))
     return float(np.sqrt(np.mean((every**2).sum(axis=1))))
-
-
-def _round(value: float) -> float:
-    return round(float(value), 3)

@@ -118,7 +118,7 @@ class PoseCase:
 
     def alternatives(self) -> list[tuple[int, ...]]:
         """Sets that are indistinguishable by these poses, the best first."""
-        return alternatives_of(self.explanation, [c.place for c in self.shelf.candidates])
+        return alternatives_of(self.explanation)
 
     def places(self, members: Sequence[int]) -> list[Place]:
         """Effects and targets of candidates."""

@@ -82,6 +82,11 @@ class Run:
     program: Path | None = None  # what the control was given
     turn: Floats | None = None  # (n, 3, 3) program axes to along and across the path, where the tip is the motion
 
+    def commanded(self, twin: Twin) -> Floats:
+        """Tips (n, 3), program frame, of the unloaded machine at the set-points."""
+        path = self.run_path
+        return twin.to_program(path.row_place.of(path.node_tip) if path.driven is None else path.driven.tip)
+
     @cached_property
     def encoders(self) -> Floats | None:
         """Encoders (n, m) of the log, None where the log lacks them."""

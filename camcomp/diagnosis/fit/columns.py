@@ -145,39 +145,26 @@ def build(
     whatever other channels see of it; what moves it by more than MINOR of it is a cause. Nuisances reach as many of their
     tolerances: a healthy one goes beyond once in 5600.
     """
-    owner: list[int] = []
-    names: list[str] = []
-    tolerance: list[float] = []
-    sign: list[float] = []
-    parts: list[list[Floats]] = []
-
-    def put(who: int, name: str, size: float, per_run: list[Floats], *, signed: int = 0) -> None:
-        owner.append(who)
-        names.append(name)
-        tolerance.append(size)
-        sign.append(float(signed))
-        parts.append(per_run)
-
+    found: list[tuple[int, int, Nuisance]] = []  # candidate, sign
     for i, candidate in enumerate(steps(candidates, len(candidates))):
-        for p, per_run in zip(
-            candidate.parameters,
-            candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
-            strict=True,
-        ):
+        own = candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate)))
+        for p, per_run in zip(candidate.parameters, own, strict=True):
             size = healthy_size(bench, candidate, p, per_run, floor_um)
-            put(i, f"{candidate.label}.{p.name}", size, per_run, signed=p.sign)
+            found.append((i, p.sign, (f"{candidate.label}.{p.name}", size, per_run)))
     for name, size, per_run in _nuisances(bench):
         if name.startswith("spring."):  # a soft machine has no more of it than of anything else
             size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
-        put(-1, name, size, per_run)
+        found.append((-1, 0, (name, size, per_run)))
+    owner, sign, every = zip(*found, strict=True)
+    names, tolerance, parts = zip(*every, strict=True)
     channels = range(6 + 2 * len(bench.actuators))
     blocks = tuple(
         ByChannel.of(np.stack([each[r][:, c] for each in parts], axis=1) for c in channels)
         for r in range(len(bench.runs))
     )
     bench.columns.clear()  # they stand in the blocks now
-    prior = Prior(np.array(tolerance), np.array(sign), MINOR / HEALTHY * np.array(tolerance))
-    return Columns(tuple(candidates), np.array(owner), tuple(names), prior, blocks)
+    prior = Prior(np.array(tolerance), np.array(sign, float), MINOR / HEALTHY * np.array(tolerance))
+    return Columns(tuple(candidates), np.array(owner), names, prior, blocks)
 
 
 def healthy_size(

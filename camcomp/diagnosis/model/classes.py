@@ -6,8 +6,6 @@ of another set; what stays of it, |d| sin(phi), is measured in noise: below INDI
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from camcomp.diagnosis.model.evidence import Members
@@ -21,34 +19,32 @@ HIDDEN = 0.2  # difference of two effects at that size, in units of the noise, b
 MOST_SETS = 4  # contract: alternatives that are listed
 
 
-def alternatives_of(explanation: Explanation, place_of: Sequence[tuple[str, str | None]]) -> list[Members]:
+def alternatives_of(explanation: Explanation) -> list[Members]:
     """Sets nearly as probable as the best one, or that do the same, the best first; supersets of it are no alternatives."""
-    data = explanation.data
-    best = explanation.members
+    data, best = explanation.data, explanation.members
     amount = data.estimate(best)[0] if best else np.zeros(0)
     top = max((p for m, p in explanation.sets if m == best), default=0.0)
-    own = {place_of[i] for i in best}
+    own = {data.candidates[i].place for i in best}
     out: list[Members] = [best]
     for members, p in explanation.sets:
-        places = {place_of[i] for i in members}
+        places = {data.candidates[i].place for i in members}
         if places == own or places > own:
             continue
         near = p >= top * np.exp(-EQUAL_LOG_ODDS)
         if not near and len(members) <= len(best) and p >= top * np.exp(-2.0 * EQUAL_LOG_ODDS):
-            _, left = _remaining(data.gram, data.indices(best), amount, data.indices(members))
-            near = left < INDISTINGUISHABLE
+            near = _remaining(data.gram, data.indices(best), amount, data.indices(members)) < INDISTINGUISHABLE
         if near:
             out.append(members)
     return out[:MOST_SETS]
 
 
-def _remaining(gram: Floats, on: list[int], amount: Floats, by: list[int]) -> tuple[float, float]:
-    """Square of an effect in floors, and the part of it that other columns cannot explain."""
+def _remaining(gram: Floats, on: list[int], amount: Floats, by: list[int]) -> float:
+    """Part of the square of an effect, in floors, that other columns cannot explain."""
     whole = float(amount @ gram[np.ix_(on, on)] @ amount)
     if not by:
-        return whole, whole
+        return whole
     toward = gram[np.ix_(by, on)] @ amount
     size = 1.0 / np.sqrt(np.maximum(np.diag(gram)[by], 1e-300))
     own = size[:, None] * gram[np.ix_(by, by)] * size
     taken = float((size * toward) @ np.linalg.lstsq(own, size * toward, rcond=1e-10)[0])
-    return whole, whole - taken
+    return whole - taken

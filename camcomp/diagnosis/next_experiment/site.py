@@ -64,7 +64,7 @@ class Site:
 
 def site_of(bench: Bench, job: Job) -> Site:
     """The site of the runs of a bench on the machine of a job."""
-    each = [commanded(bench, run) for run in bench.runs]
+    each = [run.commanded(bench.twin) for run in bench.runs]
     tips = np.concatenate(each)
     loaded = [np.abs(run.run_path.row_force).sum(axis=1) > 0.0 for run in bench.runs]
     every = np.concatenate(loaded)
@@ -83,13 +83,6 @@ def _place(tips: Floats, feeds: list[float]) -> WorkPlace:
     known = [f for f in feeds if np.isfinite(f)]
     feed = round(float(np.median(known))) if known else USUAL_FEED
     return WorkPlace(np.round(0.5 * (low + high), 1) + 0.0, 0.5 * (high - low), feed)
-
-
-def commanded(bench: Bench, run: Run) -> Floats:
-    """Tips (n, 3), program frame, of the unloaded machine at the set-points of a run."""
-    path = run.run_path
-    tips = path.row_place.of(path.node_tip) if path.driven is None else path.driven.tip
-    return bench.twin.to_program(tips)
 
 
 def _low(bench: Bench, tips: list[Floats], loaded: list[Bools]) -> float:
@@ -119,7 +112,6 @@ class Room:
     def __init__(self, twin: Twin, limits: Floats, tips: Floats) -> None:
         """limits: (m, 2) of the actuators; tips: (n, 3) of the runs, program frame."""
         self.twin, self.limits = twin, limits
-        self.most = np.inf
         some = tips[np.unique(np.linspace(0, len(tips) - 1, _POSES).astype(int))]
         self.most = STRETCH * float(np.max(self._stretch(some)))
 

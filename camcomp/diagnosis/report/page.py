@@ -195,26 +195,21 @@ def _next(proposal: NextExperiment) -> list[str]:
 
 
 def _where(where: Where) -> Section:
-    figures = [figure for figure in (figure_shares(where),) if figure]
-    tables = []
-    if where.lines:
-        lines: list[Row] = [
-            [e.run, (float(e.line), str(e.line)), (e.share, f"{100 * e.share:.1f} %"), cell(e.rms_um)]
-            for e in where.lines
-        ]
-        tables.append(
-            Table("Source lines with most of the gap", ("run", "line", "share", "rms µm"), lines, sortable=True)
+    def part(share: float) -> tuple[float, str]:
+        return share, f"{100 * share:.1f} %"
+
+    lines: list[Row] = [[e.run, (float(e.line), str(e.line)), part(e.share), cell(e.rms_um)] for e in where.lines]
+    times: list[Row] = [[e.run, cell(e.t0_s), cell(e.t1_s), part(e.share)] for e in where.intervals]
+    shaken: list[Row] = [[e.axis, cell(e.hertz), cell(e.amplitude_um), part(e.share)] for e in where.frequencies]
+    tables = [
+        Table(title, heads, rows, sortable=True)
+        for title, heads, rows in (
+            ("Source lines with most of the gap", ("run", "line", "share", "rms µm"), lines),
+            ("Times with most of the gap", ("run", "from s", "to s", "share"), times),
+            ("Vibrations", ("axis", "frequency Hz", "amplitude µm", "share"), shaken),
         )
-    if where.intervals:
-        intervals: list[Row] = [
-            [e.run, cell(e.t0_s), cell(e.t1_s), (e.share, f"{100 * e.share:.1f} %")] for e in where.intervals
-        ]
-        tables.append(Table("Times with most of the gap", ("run", "from s", "to s", "share"), intervals, sortable=True))
-    if where.frequencies:
-        shaken: list[Row] = [
-            [e.axis, cell(e.hertz), cell(e.amplitude_um), (e.share, f"{100 * e.share:.1f} %")]
-            for e in where.frequencies
-        ]
-        tables.append(Table("Vibrations", ("axis", "frequency Hz", "amplitude µm", "share"), shaken, sortable=True))
+        if rows
+    ]
     text = [f"The gap arises in the stage: {where.stage}."]
+    figures = [figure for figure in (figure_shares(where),) if figure]
     return Section(name="where", title="Where the gap is", text=text, figures=figures, tables=tables)

@@ -71,8 +71,6 @@ def _view(problem: Problem, bench: Bench, k: int, causes: Sequence[Cause], *, he
     part, run = main_channels(problem), bench.runs[k]
     before = bench.gap(k)
     after = bench.gap(k, causes) if causes else before
-    path = run.run_path
-    told = path.row_place.of(path.node_tip) if path.driven is None else path.driven.tip
     return RunView(
         name=run.name,
         held_out=held_out,
@@ -83,9 +81,9 @@ def _view(problem: Problem, bench: Bench, k: int, causes: Sequence[Cause], *, he
         channels=("along the path", "across the path", "normal to both")
         if run.turn is not None and part.start == 0
         else tuple(each.replace("_", " ") for each in channel_names(bench.actuators)[part]),
-        commanded=thinned(bench.twin.to_program(told), run.thin),
+        commanded=thinned(run.commanded(bench.twin), run.thin),
         program=run.program,
-        cutting=bool(np.any(path.row_force)),
+        cutting=bool(np.any(run.run_path.row_force)),
     )
 
 

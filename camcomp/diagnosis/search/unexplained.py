@@ -102,23 +102,19 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
         noise = np.where(np.isfinite(noise), noise, 0.0)
         if kind == "encoder":  # what shakes more than the instrument of the tip is motion
             noise = np.minimum(noise, problem.floor.axis_mm)
-        for a in range(0, len(values), BLOCK):
-            rows = values[a : a + BLOCK]
-            count = np.isfinite(rows).sum(axis=0)
-            enough = count >= BLOCK // 2
-            if not enough.any():
-                continue
-            middle = np.nansum(rows, axis=0) / np.maximum(count, 1)
-            usual = noise**2 / np.maximum(count, 1) + slow**2
-            # rows of which less is known than their noise says (a force that turns between rows) err together
-            more = np.where(np.isfinite(rows), inflate[a : a + BLOCK] ** 2 - 1.0, 0.0).sum(axis=0)
-            allowed = usual + noise**2 * more / np.maximum(count, 1)
-            excess.append(np.where(enough, middle**2 - allowed, 0.0))
-            chance.append(np.where(enough, allowed, 0.0))
-            weight.append(np.where(enough, (usual + TINY) ** 2 / (allowed + TINY) ** 2, 0.0))
-    e, v, w = np.array(excess), np.array(chance), np.array(weight)
-    if not len(e):
-        return Unexplained(kind, 0.0, 0.0)
+        seen = np.isfinite(values)
+        # rows of which less is known than their noise says (a force that turns between rows) err together
+        count, total, more = (
+            np.add.reduceat(np.where(seen, each, 0.0), np.arange(0, len(values), BLOCK))
+            for each in (1.0, values, inflate**2 - 1.0)
+        )
+        enough, count = count >= BLOCK // 2, np.maximum(count, 1.0)
+        usual = noise**2 / count + slow**2
+        allowed = usual + noise**2 * more / count
+        excess.append(np.where(enough, (total / count) ** 2 - allowed, 0.0))
+        chance.append(np.where(enough, allowed, 0.0))
+        weight.append(np.where(enough, (usual + TINY) ** 2 / (allowed + TINY) ** 2, 0.0))
+    e, v, w = (np.concatenate(each) for each in (excess, chance, weight))
     whole = np.maximum(w.sum(axis=0), 1.0)
     mean = float((np.sum(w * e, axis=0) / whole).sum())
     doubt = float(np.sqrt(2.0 * np.sum(np.sum((w * v) ** 2, axis=0) / whole**2))) + TINY

@@ -6,26 +6,16 @@ it among all the periods tried, in runs of different speed. Source: least-square
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.diagnosis.result.types import FrequencyLine
 from camcomp.diagnosis.statistics.by_channel import AT_ONCE
 from camcomp.diagnosis.statistics.places import FALSE, RunGap
 from camcomp.ground.datatypes import Floats
 
 _TREND = 4  # terms of the polynomial that is taken out with the sines, and half waves of the longest period
 _STANDS_OUT = 0.2  # share of what the trend leaves
-
-
-@dataclass(frozen=True, eq=False)
-class SpectralLine:
-    """A sine in the gap: its axis, frequency, amplitude (mm), and share of the energy."""
-
-    name: str
-    hertz: float
-    amplitude: float
-    share: float
 
 
 def _trend(x: Floats) -> Floats:
@@ -55,7 +45,7 @@ def _spectrum(y: Floats, x: Floats, frequencies: Floats, trend: Floats) -> tuple
     return np.concatenate(found), float(rest @ rest)
 
 
-def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLine]:
+def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[FrequencyLine]:
     """Lines at one frequency in time, in the channels of the gap; phases differ from run to run."""
     found, whole = [], sum(float(np.nansum(r.gap**2)) for r in runs)
     for j, name in enumerate(names):
@@ -67,8 +57,9 @@ def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLi
         step = max(float(np.median(np.diff(t))) for _, t, *_ in parts)
         tried = np.arange(0.5 * _TREND / min(spans), 1.0 / (2.0 * step), 0.25 / max(spans))
         if (line := _line(parts, tried, len(names))) is not None:
-            size = np.mean([abs(_wave(y, t, line[0])) for y, t, *_ in parts])
-            found.append(SpectralLine(name, line[0], float(size), line[1] / max(whole, 1e-300)))
+            size = 1e3 * float(np.mean([abs(_wave(y, t, line[0])) for y, t, *_ in parts]))
+            share = round(line[1] / max(whole, 1e-300), 4)
+            found.append(FrequencyLine(axis=name, hertz=round(line[0], 4), amplitude_um=round(size, 3), share=share))
     return sorted(found, key=lambda line: -line.share)
 
 
