@@ -6,6 +6,7 @@ answer on runs it has not seen.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,6 @@ from camcomp.diagnosis.result.types import (
     Estimate,
     Floor,
     FoundCause,
-    FrequencyLine,
     GapSize,
     NamedCause,
     NextExperiment,
@@ -325,11 +325,11 @@ def _stage(problem: Problem, best: Fitted, found: CauseSearch, law: LawAnswer | 
     return max(size, key=lambda each: size[each])
 
 
-def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[FrequencyLine]) -> list[Driver]:
+def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[Mapping[str, Any]]) -> list[Driver]:
     """Covariates of the gap; with an unknown cause, covariates of the residual."""
     if found.unknown_in:
         # a vibration of one frequency depends on time alone
-        lines = tuple((f"time:{line.axis}", line.share) for line in heard)
+        lines = tuple((f"time:{line['axis']}", line["share"]) for line in heard)
         labels = tuple(sorted((*lines, *found.left[found.unknown_in]), key=lambda each: -each[1]))
     else:
         null = problem.refit(())

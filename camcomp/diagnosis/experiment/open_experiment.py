@@ -16,7 +16,7 @@ from camcomp.diagnosis.experiment.log_checks import (
     check_rows,
 )
 from camcomp.diagnosis.experiment.logged import Logged
-from camcomp.diagnosis.fit.bench import Run
+from camcomp.diagnosis.fit.bench import MOST_ROWS, Run
 from camcomp.diagnosis.fit.label_offsets import with_clocks
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground.csv_table import CsvTable, TableRules, read_csv
@@ -34,7 +34,6 @@ from camcomp.model.motion.timeline import schedule
 from camcomp.model.motion.twin import Twin, twin_of
 
 STEADY_S = 15.0  # half width of the local regression of a temperature
-MOST_ROWS = 3000  # rows of a run; neighbours of longer runs are averaged
 LOG_RULES = TableRules(table="CC400", column="CC401", cell="CC403")
 
 

@@ -21,6 +21,7 @@ from camcomp.model.signal_path import fitted_parameters
 from camcomp.model.statics.arm import ARM_LENGTH
 
 SHARE_OF_SCALE = 0.05  # step of a difference, or of the logarithm of a spring or a force
+MOST_ROWS = 3000  # of a run; neighbours of longer ones are averaged
 _KEPT = 12  # changed machines whose structures are kept per run
 
 

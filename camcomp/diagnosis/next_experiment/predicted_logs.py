@@ -10,8 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from camcomp.diagnosis.experiment.driven_run import axes_along
-from camcomp.diagnosis.experiment.open_experiment import MOST_ROWS
-from camcomp.diagnosis.fit.bench import Bench, Run
+from camcomp.diagnosis.fit.bench import MOST_ROWS, Bench, Run
 from camcomp.diagnosis.fit.columns import build
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.noise import inflation

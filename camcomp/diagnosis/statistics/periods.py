@@ -6,10 +6,10 @@ it among all the periods tried, in runs of different speed. Source: least-square
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from camcomp.diagnosis.result.types import FrequencyLine
 from camcomp.diagnosis.statistics.by_channel import AT_ONCE
 from camcomp.diagnosis.statistics.places import FALSE, RunGap
 from camcomp.ground.datatypes import Floats
@@ -45,7 +45,7 @@ def _spectrum(y: Floats, x: Floats, frequencies: Floats, trend: Floats) -> tuple
     return np.concatenate(found), float(rest @ rest)
 
 
-def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[FrequencyLine]:
+def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[dict[str, Any]]:
     """Lines at one frequency in time, in the channels of the gap; phases differ from run to run."""
     found, whole = [], sum(float(np.nansum(r.gap**2)) for r in runs)
     for j, name in enumerate(names):
@@ -59,8 +59,8 @@ def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[FrequencyL
         if (line := _line(parts, tried, len(names))) is not None:
             size = 1e3 * float(np.mean([abs(_wave(y, t, line[0])) for y, t, *_ in parts]))
             share = round(line[1] / max(whole, 1e-300), 4)
-            found.append(FrequencyLine(axis=name, hertz=round(line[0], 4), amplitude_um=round(size, 3), share=share))
-    return sorted(found, key=lambda line: -line.share)
+            found.append({"axis": name, "hertz": round(line[0], 4), "amplitude_um": round(size, 3), "share": share})
+    return sorted(found, key=lambda line: -line["share"])
 
 
 def _line(

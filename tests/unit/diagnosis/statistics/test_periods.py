@@ -24,9 +24,9 @@ def test_a_vibration_is_found_in_runs_of_different_speed():
         return 0.005 * np.sin(2 * np.pi * 1.3 * t)[:, None] * [0.0, 0.0, 1.0]
 
     [line] = frequencies([run(1, gap=shake), run(2, gap=shake, feed=20.0)], NAMES)
-    assert line.axis == "z"
-    assert line.hertz == pytest.approx(1.3, rel=0.02)
-    assert line.amplitude_um == pytest.approx(5.0, rel=0.1)
+    assert line["axis"] == "z"
+    assert line["hertz"] == pytest.approx(1.3, rel=0.02)
+    assert line["amplitude_um"] == pytest.approx(5.0, rel=0.1)
 
 
 def test_what_repeats_with_the_path_is_no_vibration():
