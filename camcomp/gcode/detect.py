@@ -27,7 +27,9 @@ def dialect_of(text: Text, name: str | None = None) -> Dialect:
     """
     if name is not None:
         return _record(name)
-    sample = re.sub(END_OF_LINE, "\n", text.string[:_LOOKED_AT])
+    sample = text.string[:_LOOKED_AT]
+    if "\r" in sample:
+        sample = re.sub(END_OF_LINE, "\n", sample)
     if len(_PLAINTEXT.findall(sample)) >= 2:
         found = _PLAINTEXT.search(sample)
         row = sample.count("\n", 0, found.start(1)) if found else 0

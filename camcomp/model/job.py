@@ -16,7 +16,7 @@ from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats, Path
 from camcomp.ground.errors import ConfigError, PhysicsError
 from camcomp.ground.records import dataclass, field, replace
-from camcomp.ground.vectors import shifted
+from camcomp.ground.vectors import shift, shifted
 from camcomp.model import signal_path
 from camcomp.model.config.spec import Config
 from camcomp.model.config.taken import TakenFromProgram
@@ -38,7 +38,7 @@ class Frame:
 
     def to_machine(self, points: Floats) -> Floats:
         """Points (n, 3) mm, program to machine frame."""
-        return shifted(points @ self.rotation.T, self.origin)
+        return shift(points @ self.rotation.T, self.origin)
 
     def to_program(self, points: Floats) -> Floats:
         """Points (n, 3) mm, machine to program frame."""

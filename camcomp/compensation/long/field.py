@@ -163,7 +163,6 @@ class Field:
         self.machine, self._files = machine, files
         self.corner = middle - 0.5 * CELL_MM
         self.solved = 0  # exact solutions so far
-        self.worst = 0.0  # mm, largest error at test points of the new tiles
         self._narrower: list[tuple[tuple[Any, ...], Tiles, Tiles]] = []  # of ranges before: key, tiles, as loaded
         self._set_range(force)
 
@@ -312,16 +311,12 @@ class Field:
             alone = basis.solve_position @ joints[TESTS:]
             error = np.abs(basis.both @ aimed - loaded[:TESTS]).max(axis=0)
             off = np.abs(basis.alone @ alone - joints[:TESTS]).max(axis=0)
-            worst = self._judge(error, off, np.abs(loaded[:TESTS, 6 : 6 + m]).max(axis=0))
-            if worst > ALLOWED:
+            if self._judge(error, off, np.abs(loaded[:TESTS, 6 : 6 + m]).max(axis=0)) > ALLOWED:
                 continue
             shift = basis.solve_both @ self._shift(basis, aimed[:, :3], half)
-            worst = max(worst, float(np.abs(basis.both @ shift - unloaded).max()))
-            if worst <= ALLOWED:
-                self.worst = max(self.worst, worst)
-                return self._append(
-                    centre, half, rung, np.concatenate((aimed[:, :3], shift, aimed[:, 3:]), axis=1), alone
-                )
+            if np.abs(basis.both @ shift - unloaded).max() <= ALLOWED:
+                both = np.concatenate((aimed[:, :3], shift, aimed[:, 3:]), axis=1)
+                return self._append(centre, half, rung, both, alone)
         return None
 
     def _shift(self, basis: Basis, correction: Floats, half: float) -> Floats:

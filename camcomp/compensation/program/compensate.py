@@ -272,9 +272,11 @@ class _Correction:
             return known
         if has_memory(self.job.causes) or self.orienting is not None:
             return self._aim(nodes)
-        found, commanded = self._aim(Nodes(nodes.piece[fresh], nodes.w[fresh], nodes.first)), known.commanded[at]
-        commanded[fresh] = found.commanded
-        return _Aimed(commanded, max(known.iterations, found.iterations), np.zeros_like(commanded))
+        commanded, iterations = known.commanded[at], known.iterations
+        if len(fresh):
+            found = self._aim(Nodes(nodes.piece[fresh], nodes.w[fresh], nodes.first))
+            commanded[fresh], iterations = found.commanded, max(iterations, found.iterations)
+        return _Aimed(commanded, iterations, np.zeros_like(commanded))
 
     # --- division ------------------------------------------------------------------------------------------------
 

@@ -103,10 +103,10 @@ def meant_cut(job: Job, program: Program) -> StockMemory:
     return memory
 
 
-def nodes_of(job: Job, program: Program, step_mm: float = STEP_MM) -> int:
+def nodes_of(program: Program) -> int:
     """About how many nodes `loaded_cut` leads the tip through."""
     feeds = program.path.kind != RAPID
-    return int(np.ceil(np.nan_to_num(path_geometry.lengths(program.path)[feeds]) / step_mm).sum()) + int(feeds.sum())
+    return int(np.ceil(np.nan_to_num(path_geometry.lengths(program.path)[feeds]) / STEP_MM).sum()) + int(feeds.sum())
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -111,12 +111,6 @@ class UnderControl:
         return mine <= 1.05 * theirs and LOST_TIME * self.after_s < other.after_s
 
     @property
-    def at_joins(self) -> float:
-        """Largest error next to joining lines, mm."""
-        size = sizes(self.error[self.points.joined])
-        return float(np.nanmax(size, initial=0.0))
-
-    @property
     def off_joins(self) -> float:
         """Largest error apart from joining lines, mm."""
         size = sizes(self.error[~self.points.joined])

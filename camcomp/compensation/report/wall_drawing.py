@@ -51,7 +51,7 @@ def wall_section(job: Job, meant: Program, programs: Sequence[tuple[str, Program
     """Both drawings of the walls; None without a stock or a wall."""
     if job.config.workpiece.stock is None or job.conditions.model is None:
         return None
-    if max(nodes_of(job, program) for _, program in programs) > MOST_NODES:
+    if max(nodes_of(program) for _, program in programs) > MOST_NODES:
         refused = "The program is too long to lead the bent tool through it here; camcomp simulate --surface does."
         return Section(name="walls", title="Walls", text=[refused])
     found = cut_walls(job, meant, programs)

@@ -101,8 +101,15 @@ class Track:
 
     def u(self, piece: Ints, w: Floats) -> Floats:
         """Fraction of the motion at fraction w of the piece."""
+        if self._whole:
+            return w
         begin, end = self.u0[piece], self.u1[piece]
         return np.where(w == 1.0, end, begin + w * (end - begin))
+
+    @cached_property
+    def _whole(self) -> bool:
+        """Whether every piece is a whole motion."""
+        return bool((self.u0 == 0.0).all() and (self.u1 == 1.0).all())
 
     def points(self, piece: Ints, w: Floats) -> Floats:
         """Programmed tip (k, 3) mm at fraction w (k,) of piece (k,)."""
@@ -254,13 +261,14 @@ def _force(
     if load is not None and not c.plunges:
         found = load.base(piece[on], w[on])
     else:
-        rows = motion[piece[on]]
+        at, share = piece[on], w[on]
+        rows = motion[at]
         depth, width = (np.full(len(rows), np.nan if each is None else each) for each in (c.depth_mm, c.width_mm))
         if c.depth_mm is None and c.stock_top_mm is not None:
             depth = c.stock_top_mm - height(on)
         found = _components(
             path=path, c=c, motion=rows, direction=seen.take(on, axis=0), depth=depth, width=width,
-            s=s0[piece[on]] + w[on] * length[piece[on]], ends=w[on] == 1.0, arcs=None,
+            s=s0[at] + share * length[at], ends=share == 1.0, arcs=None,
             driven=None if driven is None else driven[on],
         )  # fmt: skip
     out[on] = to_vector(found, seen.take(on, axis=0), c.tool_axis)

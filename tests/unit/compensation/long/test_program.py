@@ -137,6 +137,20 @@ def test_runs_are_full_wherever_a_chunk_of_the_file_ends(cartesian, monkeypatch)
     assert motions[-10:-1] == [50] * 9
 
 
+def test_points_that_were_aimed_at_are_not_looked_up_again(orthoglide, monkeypatch):
+    """Also where the trial points inside of a line are no division points, so that there is no point to aim at."""
+    asked, look = [], Field.look
+
+    def counted(self, target, force, *, every=True):
+        asked.extend([every] * bool(len(target)))
+        return look(self, target, force, every=every)
+
+    monkeypatch.setattr(Field, "look", counted)
+    lines = "\n".join(f"G1 X{22 + 10 * (k % 2)} Y{0.01 * k:.2f} Z0" for k in range(300))
+    both(orthoglide, HEAD + lines + "\n", tolerance=50.0)
+    assert asked == [True, False] * 2 + [True] * 3, "trial points and middles of two runs, and three times the proof"
+
+
 def test_long_lines_are_divided_alike(orthoglide):
     """Where along a line a division point stands hardly matters; how far it is from the line does."""
     lines = [
