@@ -57,7 +57,7 @@ class InterpolatedMachine:
             answer, nominal, tile = known.look(near, force)
             own = nominal
         if mode == TARGET:
-            commanded, own = near + answer[:, :3], nominal + answer[:, 9 + m :]
+            commanded, own = near + answer[:, :3], nominal if tips_only else nominal + answer[:, 9 + m :]
         else:
             tip = commanded + answer[:, 3:6]
             if tips_only:

@@ -258,8 +258,10 @@ class _Correction:
             own = (track.motion[piece] >= self.part.first) & (track.motion[piece] < self.part.last)
             status = np.where(own, status, 0)
         refuse_unsolved(self.program, track, piece, target, status)
-        out = track.points(nodes.piece, nodes.w)
-        out[on] = result.commanded.take(asked, axis=0)
+        aimed = out = result.commanded.take(asked, axis=0)
+        if len(on) < len(nodes.w):
+            out = track.points(nodes.piece, nodes.w)
+            out[on] = aimed
         if self.shares is not None:
             out = self.shares.taken(track, nodes.piece, nodes.w, track.points(nodes.piece, nodes.w), out)
         return _Aimed(out, int(result.iterations[asked].max(initial=0)), words)

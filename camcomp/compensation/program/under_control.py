@@ -246,8 +246,8 @@ def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um
 def modes_of(modes: Sequence[PathMode], motions: Ints) -> tuple[PathMode, ...]:
     """The modes of some motions, in the order in which they come."""
     known, which = numbered(modes)
-    first = np.unique(which[motions], return_index=True)[1]
-    return distinct(known[which[motions[k]]] for k in np.sort(first))
+    of = which[motions]
+    return distinct(known[k] for k in of[np.diff(of, prepend=-1) != 0])
 
 
 def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:

@@ -244,7 +244,7 @@ def _force(
     piece: Ints,
     w: Floats,
     direction: Floats,
-    height: Callable[[Ints], Floats],
+    height: Callable[[Ints | slice], Floats],
     driven: Floats | None = None,
     turned: Floats | None = None,
 ) -> Floats:
@@ -254,9 +254,10 @@ def _force(
     rotation of the tool from the axis of the conditions. The model sees the feed in the frame of the tool.
     """
     out = np.zeros((len(piece), 3))
-    on = np.flatnonzero(cutting[piece] & (sizes(direction) > 0.0))
-    if c.model is None or not len(on):
+    cuts = cutting[piece] & (sizes(direction) > 0.0)
+    if c.model is None or not cuts.any():
         return out
+    on = slice(None) if cuts.all() else np.flatnonzero(cuts)
     seen = direction if turned is None else np.einsum("kji,kj->ki", turned, direction)
     if load is not None and not c.plunges:
         found = load.base(piece[on], w[on])
@@ -267,11 +268,11 @@ def _force(
         if c.depth_mm is None and c.stock_top_mm is not None:
             depth = c.stock_top_mm - height(on)
         found = _components(
-            path=path, c=c, motion=rows, direction=seen.take(on, axis=0), depth=depth, width=width,
+            path=path, c=c, motion=rows, direction=seen[on], depth=depth, width=width,
             s=s0[at] + share * length[at], ends=share == 1.0, arcs=None,
             driven=None if driven is None else driven[on],
         )  # fmt: skip
-    out[on] = to_vector(found, seen.take(on, axis=0), c.tool_axis)
+    out[on] = to_vector(found, seen[on], c.tool_axis)
     return out if turned is None else np.einsum("kij,kj->ki", turned, out)
 
 
