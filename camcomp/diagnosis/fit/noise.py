@@ -51,38 +51,25 @@ def inflation(bench: Bench) -> list[Floats]:
     In units of the channel's own noise, which is not known yet: here the extra standard deviation in mm or N.
     """
     out = []
-    unsteady, unseen_speeds = jitter(bench), _unseen_speeds(bench)
+    unsteady, late = jitter(bench), _late(bench)
     for k, run in enumerate(bench.runs):
         observed = bench.observed(k)
         extra = np.zeros_like(observed)
         t = run.run_path.time
         if run.run_path.ordered and len(t) > 4:
-            change = _changes(run)
+            change, between = _changes(run), rounding_noise(float(np.median(np.diff(t))))
             place = run.run_path.place(t)
             slope = np.abs(bench.twin.rotation.T @ place.of(bench.slopes[k].tip_rho))
             m = len(bench.actuators)
-            of_drives = TIMING_S**2 * change + unseen_speeds[k]
-            # a tip read between the rows may lie at a speed that the rows lack
-            unseen = run.run_path.between_s * rounding_noise(float(np.median(np.diff(t))))
-            extra[:, :3] = np.einsum("nij,nj->ni", slope, of_drives + unseen * change)
+            # a late drive stands behind by its speed, and a tip is read at one, that the rows lack
+            of_drives = (TIMING_S**2 + late * between) * change
+            extra[:, :3] = np.einsum("nij,nj->ni", slope, of_drives + run.run_path.between_s * between * change)
             extra[:, 3 : 3 + m] = of_drives
             if unsteady > 0.0:
                 extra[:, :3] = np.hypot(extra[:, :3], unsteady * np.abs(_speed(bench, k)))
         extra = np.hypot(np.hypot(extra, _doubt(bench, k)), unknown_starts(bench, k))
         extra = np.where(np.isfinite(observed), extra, np.nan)
         out.append(thinned(extra, run.thin))
-    return out
-
-
-def _unseen_speeds(bench: Bench) -> list[Floats]:
-    """Per run (n, m) mm or rad: a late drive stands behind by its speed, which between rows may have been another one."""
-    late = _late(bench)
-    out = []
-    for run in bench.runs:
-        t = run.run_path.time
-        known = run.run_path.ordered and len(t) > 4 and late.any()
-        usual = float(np.median(np.diff(t))) if known else 0.0
-        out.append(late * rounding_noise(usual) * _changes(run) if known else np.zeros((len(t), len(late))))
     return out
 
 
