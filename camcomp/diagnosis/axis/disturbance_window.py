@@ -18,7 +18,6 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 END_S = 0.02  # in which most of a push comes or goes, two rows at least; no place ends like that
 SHORTEST_S = 0.2  # of a window
 LEAST_SIZE = 2.0  # of the floor, that a push has to be: a force's zero wanders by less
-FARTHEST = 3  # cells by which an end is moved to its row
 
 
 @dataclass(frozen=True)
@@ -40,20 +39,17 @@ def find_window(
     With what all else leaves of the window's run (n,), the push still in it.
     """
     rests, bases = _projected(values, beside)
-    best: tuple[float, int, int, int] | None = None
-    for k, rest in rests.items():
-        step = float(np.median(np.diff(times[k])))
-        cell = max(round(END_S / step), 1, len(rest) // 400)
-        edges, shortest = np.arange(0, len(rest) - cell + 1, cell), cell * max(round(SHORTEST_S / (cell * step)), 2)
-        score, first, last = best_window(np.ones((len(rest), 1)), rest[:, None], bases[k][:, None], edges, shortest)
-        if score > (best[0] if best else 0.0):
-            best = score, k, first, last
-    if best is None:
+
+    def best_of(k: int) -> tuple[float, int, int]:
+        n, step = len(rests[k]), float(np.median(np.diff(times[k])))
+        cell, shortest = max(round(END_S / step), 1, n // 400), max(round(SHORTEST_S / step), 2)
+        return best_window(np.ones((n, 1)), rests[k][:, None], bases[k][:, None], np.arange(n + 1), shortest, cell)
+
+    found = {k: best_of(k) for k in rests}
+    k = max(found, key=lambda each: found[each][0])
+    gain, first, last = found[k]
+    if not gain > 0.0:
         return None
-    _, k, first, last = best
-    shift, rest = _alone(rests[k], bases[k], first, last)
-    step = float(np.median(np.diff(times[k])))
-    first, last = _placed(rest, first, last, FARTHEST * max(round(END_S / step), 1, len(rest) // 400))
     shift, rest = _alone(rests[k], bases[k], first, last)
     if abs(shift) < LEAST_SIZE * floor or times[k][last - 1] - times[k][first] < SHORTEST_S:
         return None
@@ -142,18 +138,3 @@ def rising(push: Floats, time: Floats, rise_s: float) -> Floats:
 
 def _beside(rest: Floats, at: int, side: int, reach: int) -> Floats:
     return rest[at : at + reach] if side > 0 else rest[at - reach : at]
-
-
-def _placed(rest: Floats, first: int, last: int, reach: int) -> tuple[int, int]:
-    """Both ends moved by up to `reach` rows to where the step is."""
-
-    def step_at(near: int) -> int:
-        low, high = max(near - reach, 1), min(near + reach, len(rest) - 1)
-        a, b = max(low - reach, 0), min(high + reach, len(rest))
-        cuts = np.arange(low, high + 1)
-        sums = np.concatenate([[0.0], np.cumsum(rest[a:b])])
-        n, m = cuts - a, b - cuts
-        before, behind = sums[cuts - a] / n, (sums[-1] - sums[cuts - a]) / np.maximum(m, 1)
-        return int(cuts[np.argmax((before - behind) ** 2 * n * m)])
-
-    return (step_at(first) if first > 0 else 0), step_at(last)

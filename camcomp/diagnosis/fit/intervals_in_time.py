@@ -85,11 +85,7 @@ def _best(column: Floats, rest: Floats, starts: Ints) -> tuple[float, int, int]:
     instant.
     """
     n, ends = len(starts), np.append(starts, len(rest))
-    edges, near = np.unique(np.linspace(0, n, min(_BLOCKS, n) + 1).astype(np.int64)), int(np.ceil(n / _BLOCKS))
-    shortest = IN_A_ROW * len(rest) // n
-    for _ in range(3):
-        motion, left = column[:, None], rest[:, None]
-        gain, *rows = best_window(motion, left, np.zeros((*motion.shape, 0)), ends[edges], shortest)
-        i, j = np.searchsorted(ends, rows).tolist()
-        edges = np.unique(np.clip([[at + by for by in range(-near, near + 1)] for at in (i, j)], 0, n))
+    motion, none = column[:, None], np.zeros((len(rest), 1, 0))
+    gain, *rows = best_window(motion, rest[:, None], none, ends, IN_A_ROW * len(rest) // n, step=-(-n // _BLOCKS))
+    i, j = np.searchsorted(ends, rows).tolist()
     return gain, i, j
