@@ -210,10 +210,8 @@ class Problem:
         """White columns (w, k) per run as they are at a fit."""
         index = self.member_columns(f.members)
         white = [W.exchanged(index, own) for W, own in zip(self.white, f.white, strict=True)]
-        if f.farther is not None:
-            pushed = np.flatnonzero(f.farther > 1.0)
-            white = [W.exchanged(pushed, self._pushed(k, f.farther)) for k, W in enumerate(white)]
-        return white
+        pushed = np.flatnonzero(f.farther > 1.0)
+        return [W.exchanged(pushed, self._pushed(k, f.farther)) for k, W in enumerate(white)]
 
     def _pushed(self, k: int, farther: Floats) -> Floats:
         """White columns (w, p) of run k that bend the machine farther (k,) than at nominal: the tip moves more, the force is the same."""

@@ -26,7 +26,6 @@ STANDING_MM_PER_S = 0.05  # below which a tip has no direction of its own
 START_MM = 0.1  # by which an actuator has to move before its play is taken up: play and guides as bad as they come
 START_N = 1000.0  # how hard its guide may hold its carriage until then
 ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
-STARTING_ROWS = 2
 SWING_S = 0.03  # times the speed with which a log begins: how far a loop may then stand from where it is told
 SWINGS_S = 0.06  # in which that dies away: loops of 5 to 60 Hz as they are tuned
 
@@ -42,7 +41,7 @@ def start_columns(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> 
         for j, a in enumerate(bench.actuators):
             lever = bench.levers[j]
             still = _standing(lever * run.run_path.row_rho[:, j])[0]
-            if still.sum() < STARTING_ROWS:
+            if still.sum() <= 1:
                 continue
             shift = np.zeros_like(bench.observed(r))
             shift[:, :3] = bench.turned(r, bench.row_slopes[r][:, :, j] * still[:, None])
@@ -76,7 +75,7 @@ def unknown_starts(bench: Bench, k: int) -> Floats:
         rows: list[int] = []
         for i in (0, *turned):
             standing, under_way = _standing(rho[i:])
-            short = standing.sum() < STARTING_ROWS
+            short = standing.sum() <= 1
             rows += [i] if short else []
             rows += (i + np.flatnonzero(under_way)).tolist() if short or i == 0 else []
         unknown = np.zeros(len(path.time))

@@ -17,7 +17,6 @@ from itertools import pairwise
 import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.classes import HIDDEN, LARGE
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.predicted_logs import PredictedLogs, Question, seen_apart
 from camcomp.diagnosis.statistics.cause_sets import Fitted
@@ -75,7 +74,7 @@ def predicted_gain(question: Question, candidate: Candidate, there: PredictedLog
             gap = signals[:, i] - signals[:, j]
             move = np.linalg.solve(M, D.T @ gap)
             left = gap - D @ move
-            by_kind[i, j] = [seen_apart(signals[a:b][:, [i, j]], left[a:b], HIDDEN, LARGE) for a, b in pairwise(ends)]
+            by_kind[i, j] = [seen_apart(signals[a:b][:, [i, j]], left[a:b]) for a, b in pairwise(ends)]
             rests[i, j] = [np.sqrt(np.mean(left[a:b] ** 2)) if b > a else 0.0 for a, b in pairwise(ends)]
             apart[i, j] = float(by_kind[i, j].sum()) + float(move @ move)
             apart[i, j] += _by_other_means(problem, rivals[i], rivals[j], candidate)

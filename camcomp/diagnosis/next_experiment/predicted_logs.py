@@ -122,7 +122,7 @@ def _lay(question: Question, candidate: Candidate, whole: bool) -> PredictedLogs
     changes = [bench.channels(0, bench.read(0, problem.causes(f.members, f.theta, f.extra))) - nominal for f in rivals]
     alone = _whitened(problem, bench, np.stack(changes, axis=2))
     if len(rivals) > 1 and not candidate.knows and all(
-        not seen_apart(each[:, [i, j]], each[:, i] - each[:, j], HIDDEN, LARGE)
+        not seen_apart(each[:, [i, j]], each[:, i] - each[:, j])
         for each in alone.values() for i, j in combinations(range(len(rivals)), 2)
     ):  # fmt: skip
         raise ValueError("nothing to see")
@@ -236,10 +236,9 @@ def _temperature(problem: Problem, common: Floats) -> Floats | None:
     return out
 
 
-def seen_apart(signals: Floats, left: Floats, hidden: float, large: float) -> float:
-    """Chi-square of white rows `left` (w,) beyond the model error of signals (w, 2), for any number of rows.
-
-    hidden: model error, in units of the noise, of signals `large` times the noise.
+def seen_apart(signals: Floats, left: Floats) -> float:
+    """Chi-square of white rows `left` (w,) beyond the model error of signals (w, 2), for any number of rows: HIDDEN, in units
+    of the noise, of signals LARGE times the noise.
     """
-    own = np.max(signals**2, axis=1) / large**2
-    return max(float((left**2).sum()) - hidden**2 * (len(left) + float(own.sum())), 0.0)
+    own = np.max(signals**2, axis=1) / LARGE**2
+    return max(float((left**2).sum()) - HIDDEN**2 * (len(left) + float(own.sum())), 0.0)

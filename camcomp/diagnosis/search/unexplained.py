@@ -71,10 +71,8 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
     index = problem.member_columns(f.members)
     usual = estimate(f.data, problem.prior, index)[0]
     usual[index] = 0.0
-    moved = (problem.columns.blocks[k] @ usual).reshape(left.shape[1], -1)
-    if f.farther is not None:
-        moved[:3] = (problem.columns.blocks[k] @ (usual * f.farther)).reshape(left.shape[1], -1)[:3]
-    return np.asarray(left - moved.T)
+    tip, others = ((problem.columns.blocks[k] @ each).reshape(left.shape[1], -1) for each in (usual * f.farther, usual))
+    return np.asarray(left - np.concatenate([tip[:3], others[3:]]).T)
 
 
 def undetermined(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:

@@ -41,9 +41,8 @@ class Fitted:
     extra: Mapping[int, Mapping[str, float]] = field(default_factory=dict)  # scanned shapes by candidate
     white: tuple[Floats, ...] = ()  # per run (w, d), the members' columns at the fit
     residual: tuple[Floats, ...] = ()  # per run (w,), in absolute coordinates
-    farther: Floats | None = (
-        None  # (k,) how many times as far as at nominal every column bends the machine of the members
-    )
+    # (k,) how many times as far as at nominal every column bends the machine of the members
+    farther: Floats = field(default_factory=lambda: np.ones(1))
     minor: Members = ()  # minor causes in the evidence that are not reported
 
     @property
