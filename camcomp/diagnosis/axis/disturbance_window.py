@@ -43,7 +43,9 @@ def find_window(
     def best_of(k: int) -> tuple[float, int, int]:
         n, step = len(rests[k]), float(np.median(np.diff(times[k])))
         cell, shortest = max(round(END_S / step), 1, n // 400), max(round(SHORTEST_S / step), 2)
-        return best_window(np.ones((n, 1)), rests[k][:, None], bases[k][:, None], np.arange(n + 1), shortest, cell)
+        return best_window(
+            np.ones((n, 1)), rests[k][:, None], bases[k][:, None], np.arange(n + 1), shortest=shortest, step=cell
+        )
 
     found = {k: best_of(k) for k in rests}
     k = max(found, key=lambda each: found[each][0])
