@@ -6,6 +6,7 @@ import yaml
 from scipy.signal import lfilter
 
 from camcomp.api.diagnosis import diagnose
+from camcomp.ground import shelf
 from tests.commandline import ROOT
 from tests.validation.measured import tables
 
@@ -325,6 +326,9 @@ def test_friction_shows_in_ten_rows_a_second(tmp_path):
     assert result.verdict == "identified" and {c.effect for c in result.causes} == {"friction", "servo_lag"}
     (friction,) = [c for c in result.causes if c.effect == "friction"]
     assert "stribeck_N" not in friction.parameters
+    presliding = next(p for p in shelf.load("effects", "friction").PARAMETERS if p.name == "presliding_mm")
+    # rows are too far apart for it
+    assert friction.parameters["presliding_mm"].ci95 == (presliding.low, presliding.high)
     for name, true in (("force_N", coulomb), ("viscous_Ns_per_mm", viscous)):
         low, high = friction.parameters[name].ci95
         assert low <= true <= high and high - low < 0.2 * true, name

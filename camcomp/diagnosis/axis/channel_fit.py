@@ -317,7 +317,7 @@ def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[
             low, high = value - term.known[name], value + term.known[name]
         else:
             factor = float(np.exp(1.96 * float(np.hypot(spreads.get(name, 0.0), KNOWN))))
-            low, high = value / factor, value * factor
+            low, high = (term.bounded(name, each) for each in (value / factor, value * factor))
         out[name] = Estimate.stated(value, low, high)
     return out
 
