@@ -216,7 +216,7 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit, sd
         acting.append((term, amount[i]))
         imitated.append(
             _no_imitation(
-                data, linear, i, effect=np.concatenate(own), left=np.concatenate(train), gains=gains[1], sd=sd
+                data, terms, linear, i, effect=np.concatenate(own), left=np.concatenate(train), gains=gains[1], sd=sd
             )
         )
         causes.append(
@@ -235,17 +235,26 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit, sd
 
 
 def _no_imitation(
-    data: ChannelData, linear: LinearFit, i: int, *, effect: Floats, left: Floats, gains: Mapping[str, float], sd: float
+    data: ChannelData,
+    terms: Sequence[AxisCause],
+    linear: LinearFit,
+    i: int,
+    *,
+    effect: Floats,
+    left: Floats,
+    gains: Mapping[str, float],
+    sd: float,
 ) -> float:
     """Probability of a member with an effect (n,), where the excess of the residual (n,) over the floor is unmodelled for
     certain.
     """
-    found = linear.found
+    found, term = linear.found, terms[i]
     others = tuple(j for j in found.members if j != i)
+    alike = 1.0 if term.run else term.ways  # shapes of one cause, but windows, are imitated together
     return probability_with_unmodelled(
         effect, _design(linear, i), {name: (gains.get(name, 0.0), own) for name, own in _functions(data).items()},
         excess=float(np.sqrt(max(float(np.mean(left**2)) - data.floor**2, 0.0))), floor=data.floor, noise=sd,
-        odds=found.data.prior(found.members) - found.data.prior(others),
+        odds=found.data.prior(found.members) - found.data.prior(others) + float(np.log(alike)),
     )  # fmt: skip
 
 

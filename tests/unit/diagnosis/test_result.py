@@ -118,3 +118,13 @@ def test_the_unknown_on_an_axis_is_named_where_its_rows_show_it():
     )
     assert short.verdict != "unknown"
     assert long.verdict == "unknown" and long.causes[-1].probability > 0.99
+
+
+def test_many_shapes_of_friction_make_it_no_less_probable_beside_something_unmodelled():
+    """30 N of friction, and 20 N that swing and fade with the speed: these may imitate a part of it, in any of its shapes."""
+    run = axis_run()
+    speed = np.gradient(run.setpoint, run.time)
+    swinging = 20.0 * np.sign(speed) * np.exp(-np.abs(speed) / 60.0) * np.cos(np.abs(speed) / 12.0)
+    found = axis_study({"x": [replace(run, force=run.force + swinging)]})
+    (friction,) = [c for c in found.causes if c.effect == "friction"]
+    assert found.verdict == "unknown" and 0.5 < friction.probability < 0.8
