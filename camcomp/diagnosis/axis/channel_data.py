@@ -36,9 +36,9 @@ class ChannelData:
 
     train, test: runs that are fitted, and that are judged only. numbers: of the runs in their experiment. floor: noise of the
     channel. whole: times and values of every row. asymmetric: whether friction in the drive force differs between the
-    directions, which deflects the loop. unsure (n,) per run: what rows are not known to beside the floor, nothing where it is not given; misfit: what is
-    left of them, in floors, at least 1, beside which that counts. between (n, 2) per run: what it is not known to for want
-    of set-points between its rows. healthy: columns of
+    directions, which deflects the loop. unsure (n,) per run: uncertainty of rows in addition to the floor, 0 where it is not given; misfit: rms residual in
+    floors, at least 1, to which it is added. between (n, 2) per run: uncertainty by the set-points between two rows, which no
+    log holds. healthy: columns of
     the sizes that every axis has; inertia: those that are force of inertia alone. covariates (n,) of the dictionary. response:
     what causes with their amplitudes (d,) add to the channel of run k (n,). level: constant without a meaning. clock: standard
     deviation of the instants of rows against the motion, s. scatter: of the encoders by which the axis moved, row by row.
@@ -86,7 +86,7 @@ class ChannelData:
         return np.concatenate([(rows[k].T / self.noise(k)).T for k in self.train])
 
     def noise(self, run: int) -> Floats:
-        """Noise (n,) of the rows of a run beside what is left of them, 1 where they are known to the floor."""
+        """Noise (n,) of the rows of a run in units of their misfit, 1 where they are known to the floor."""
         own = self.unsure[run] if self.unsure else np.zeros(len(self.values[run]))
         return np.asarray(np.hypot(1.0, own / (self.misfit * self.floor)))
 

@@ -133,7 +133,7 @@ def sharp(window: Window, rest: Floats, time: Floats) -> bool:
 
 
 def rising(push: Floats, time: Floats, rise_s: float) -> Floats:
-    """What a force (n,) N in a window is not known to where it comes and goes, row by row: half of what it changes by."""
+    """Uncertainty (n,) N of a force in a window at its ends, row by row: half of its change."""
     reach = 2 * max(round(rise_s / float(np.median(np.diff(time)))), 1) + 1
     return np.asarray(0.5 * (maximum_filter1d(push, reach) - minimum_filter1d(push, reach)))
 

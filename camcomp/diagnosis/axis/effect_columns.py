@@ -247,7 +247,7 @@ def candidates(
 def _with_more_friction(
     fits: Sequence[tuple[dict[str, float], tuple[Parameter, ...]]], hinge: bool
 ) -> list[tuple[dict[str, float], tuple[Parameter, ...]]]:
-    """Shapes and parameters of Coulomb friction by itself, with friction of the speed, and with Stribeck's beside it."""
+    """Shapes and parameters of Coulomb friction by itself, with friction of the speed, and with Stribeck's in addition."""
     known = {p.name: p for p in shelf.load("effects", "friction").PARAMETERS}
     viscous, asymmetry = (known[name] for name in DRAG[hinge])
     more, slow = (known[name] for name in STRIBECK[hinge])

@@ -111,11 +111,11 @@ def _count(time: Floats) -> int:
 
 
 def not_known(own: Floats) -> Floats:
-    """What a force (n,) N by inertia and friction is not known to, row by row: its size, and when within a row."""
+    """Uncertainty (n,) N of a force by inertia and friction, row by row: of its size, and of its instant within a row."""
     return np.asarray(np.hypot(KNOWN * own, within_a_row(own)))
 
 
 def within_a_row(own: Floats) -> Floats:
-    """What values (n,) are not known to, row by row, where the instant of a row is not; at a peak of one row, too."""
+    """Uncertainty (n,) of values by the instant of a row, which is known to half a row; at a peak of one row, too."""
     steps = np.abs(np.diff(own))
     return np.asarray(WITHIN * np.maximum(np.append(steps, 0.0), np.insert(steps, 0, 0.0)))

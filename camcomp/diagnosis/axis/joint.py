@@ -105,7 +105,7 @@ def _find_ripple(found: AxisFindings, channel: AxisChannel) -> None:
 
 
 def _following_laws(rows: ChannelData) -> dict[str, tuple[str, ...]]:
-    """Formulas of what every axis has in its following error, by kind, over its motion behind effects of the control, mm or rad.
+    """Formulas of the sizes that every axis has in its following error, by kind, over its motion behind effects of the control.
 
     The speed is that of a lag too small or too unsure to be a cause.
     """

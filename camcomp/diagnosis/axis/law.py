@@ -108,18 +108,18 @@ class AxisRows(TermRows):
 
 
 def axis_law(
-    name: str, force: AxisChannel | None, following: AxisChannel | None, told: Sequence[AxisTravel]
+    name: str, force: AxisChannel | None, following: AxisChannel | None, asked: Sequence[AxisTravel]
 ) -> Law | None:
-    """The law of the residuals of an axis; told: the travel of its set-points, per run of the following error."""
+    """The law of the residuals of an axis; asked: the travel of its set-points, per run of the following error."""
     own = force or following
     if own is None:
         return None
-    rows = AxisRows(name, own, [r.move for r in force.fitted] if force else told, force=force is not None)
+    rows = AxisRows(name, own, [r.move for r in force.fitted] if force else asked, force=force is not None)
     found = _found(rows)
     if found is None:
         return None
     law = law_result(rows, found, *_sizes_um(rows, found))
-    second = _written(name, following, told, found) if following is not None else None
+    second = _written(name, following, asked, found) if following is not None else None
     if force is None:
         return second
     before, after = (1e-3 * each for each in (law.before_rms_um, law.after_rms_um))
@@ -137,10 +137,10 @@ def axis_law(
     )  # fmt: skip
 
 
-def _written(name: str, following: AxisChannel, told: Sequence[AxisTravel], found: FoundLaw) -> Law | None:
-    """The terms of a law as a following error shows them beside its causes as they are; None where it does not."""
-    rows = AxisRows(name, following, told, force=False, held=True)
-    same = fitted(Shapes(rows), [Term(rows.spot, t.form) for t in found.terms], rows.folds(usual_split(len(told))))
+def _written(name: str, following: AxisChannel, asked: Sequence[AxisTravel], found: FoundLaw) -> Law | None:
+    """The terms of a law, fitted to a following error whose causes stay as they are; None where it does not show them."""
+    rows = AxisRows(name, following, asked, force=False, held=True)
+    same = fitted(Shapes(rows), [Term(rows.spot, t.form) for t in found.terms], rows.folds(usual_split(len(asked))))
     before, after = _sizes_um(rows, same)
     return None if after > BETTER * before else law_result(rows, same, before, after)
 

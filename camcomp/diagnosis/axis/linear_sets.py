@@ -78,8 +78,8 @@ def joint_columns(data: ChannelData, terms: Sequence[AxisCause], k: int, at: Seq
 def refined_shapes(
     data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats], sd: float
 ) -> tuple[list[AxisCause], list[Floats]]:
-    """Terms and amplitudes with the shapes of the causes that act by one Gauss-Newton step, and the better setting of their
-    switches, which causes that are not there yet do not show; as they are where it does not help.
+    """Terms and amplitudes after one Gauss-Newton step of the shapes of the causes that act, with the better setting of their
+    switches, which only causes that act show; unchanged where the step does not help.
     """
     terms, at, base = [*terms], [*at], misfit(data, terms, members, at, sd)
     for i in members:

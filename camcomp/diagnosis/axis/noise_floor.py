@@ -89,7 +89,7 @@ def instants_apart(values: Sequence[Floats], speeds: Sequence[Floats], floor: fl
 
 
 def between_rows(time: Floats, setpoint: Floats, late_s: float) -> Floats:
-    """What a following error is not known to (n, 2) mm, by the rows on either side, because nobody logged how set-points went between two rows.
+    """Uncertainty (n, 2) mm of a following error by the motion of set-points between two rows, from the rows on either side.
 
     A loop of first order that follows `late_s` behind remembers, dt later, e^-x (x = dt / late_s) of how far its set-points
     were off the straight line between rows. A constant acceleration a is off by a s (dt - s) / 2 within a row, of which the loop

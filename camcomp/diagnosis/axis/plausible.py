@@ -52,7 +52,7 @@ def _refused(rule: str, log: str, text: str) -> ConfigError:
 
 
 def _readings(name: str, runs: Mapping[str, AxisRun]) -> Iterator[Reading]:
-    """Other ways to read set-points and encoder of an axis, with what they leave of the gap."""
+    """Other ways to read set-points and encoder of an axis, with the gap that remains."""
     run = runs[name]
     known = np.isfinite(run.setpoint)
     setpoint, time = run.setpoint[known], run.time[known]

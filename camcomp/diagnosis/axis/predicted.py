@@ -1,4 +1,4 @@
-"""Runs of axes without what the machine file's effects make of them, as the one signal path predicts it."""
+"""Runs of axes without the effects of the machine file, as the one signal path predicts them."""
 
 from __future__ import annotations
 

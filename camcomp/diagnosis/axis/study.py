@@ -128,7 +128,7 @@ def _verdict(found: Sequence[AxisFindings]) -> Word:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AxisTask:
-    """What is asked of one axis: its name, usable runs, numbers of those that are fitted and of those that are judged only, effects
+    """The task of one axis: its name, usable runs, numbers of those that are fitted and of those that are judged only, effects
     left out, and what is around it.
     """
 
@@ -193,7 +193,7 @@ def _motor(blank: AxisFindings, task: AxisTask) -> AxisFindings:
 
 
 def _study_following(found: AxisFindings, task: AxisTask, asymmetric: bool) -> float | None:
-    """The following error; how late the axis is on average, s, None where that does not show."""
+    """Study the following error; returns the mean lateness of the axis in s, None without set-points."""
     every, train = task.usable, task.train
     gaps = [r.gap for r in every]
     if not train or not all(np.isfinite(gaps[k]).all() for k in train):
