@@ -57,6 +57,8 @@ def find_window(
         return None
     # it takes a while to come and to go: rows at its ends are not as high as it is
     inside, outside = away_from_ends(first, last, times[k])
+    if inside.sum() < PARTS:
+        return None
     shift = _step(rests[k], inside, outside) / _step(_seen(bases[k], first, last), inside, outside)
     parts = [float(np.mean(p) - np.mean(rest[outside])) for p in np.array_split(rest[inside], PARTS)]
     if not all(abs(p - shift) < 0.5 * abs(shift) for p in parts):

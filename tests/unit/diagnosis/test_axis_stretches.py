@@ -27,6 +27,14 @@ def test_rows_in_which_a_push_comes_and_goes_do_not_lower_it():
     assert abs(window.first - 1500) <= 1 and abs(window.last - 2000) <= 1
 
 
+def test_three_rows_are_no_push():
+    """At ten rows a second: too few for parts that are each as high as the whole."""
+    time = 0.1 * np.arange(400)
+    force = NOISE * np.random.default_rng(0).standard_normal(400)
+    force[150:153] += FORCE
+    assert find_window({0: force}, {0: np.sin(3.0 * time)[:, None]}, {0: time}, NOISE) is None
+
+
 @pytest.mark.parametrize("begin", [4000, pytest.param(4020, marks=pytest.mark.campaign)])
 def test_a_push_that_begins_among_lost_rows_is_not_known_to_better(begin):
     rng = np.random.default_rng(begin)
