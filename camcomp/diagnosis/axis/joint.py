@@ -314,8 +314,7 @@ def _channel(rows: ChannelData, done: ChannelFit, sure: Sequence[Bools]) -> Axis
     constant = done.sizes["offset"][0] if rows.channel == "force" else 0.0
     pushing = [each for each in done.acting if each[0].run is not None]
     pushed = [rows.response(k, pushing) for k in range(len(values))]
-    rows = replace(rows, misfit=1.0)
-    # as large as it is seen to be at most
+    # noise is as large as it is seen to be at most
     floors = [(rows.noise(k), np.maximum(np.abs(done.left[k]) / rows.floor, 1.0)) for k in rows.train]
     spread = float(np.sqrt(np.mean(np.concatenate([np.minimum(*each) for each in floors]) ** 2)))
     channel = AxisChannel(

@@ -10,8 +10,7 @@ from camcomp.ground.datatypes import Floats
 
 def log_gain(left: Floats, columns: Floats, more: Floats, floor: float) -> float:
     """Log Bayes factor of further columns (n, q) for residuals (n,) to which columns (n, k) were fitted."""
-    A = columns / (np.sqrt(np.mean(columns**2, axis=0)) + 1e-300)
-    X = more - A @ np.linalg.lstsq(A, more, rcond=1e-9)[0]
+    X = left_of_fit(columns, more)
     X = X / (np.sqrt(np.mean(X**2, axis=0)) + 1e-300)
     sd = noise_after_fit(X, left, floor)
     return float(gains_at_scales(X.T @ X, X.T @ left / sd)[0].max())

@@ -50,7 +50,7 @@ def of_table(
     """Some columns of a table; cells are read and checked on access. units: of all its columns, else those of its first row."""
     if units is None:
         units = _units_below_names(table)
-        table = table.below(bool(units))
+        table = table.below(1) if units else table
     wanted = range(len(table.header)) if columns is None else columns
     kept = [j for j in wanted if table.header[j] not in ("", UNNAMED)]
 
