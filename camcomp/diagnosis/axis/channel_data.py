@@ -36,12 +36,12 @@ class ChannelData:
 
     train, test: runs that are fitted, and that are judged only. numbers: of the runs in their experiment. floor: noise of the
     channel. whole: times and values of every row. asymmetric: whether friction in the drive force differs between the
-    directions, which deflects the loop. unsure (n,) per run: uncertainty of rows in addition to the floor, 0 where it is not given; misfit: rms residual in
-    floors, at least 1, to which it is added. between (n, 2) per run: uncertainty by the set-points between two rows, which no
-    log holds. healthy: columns of
-    the sizes that every axis has; inertia: those that are force of inertia alone. covariates (n,) of the dictionary. response:
-    what causes with their amplitudes (d,) add to the channel of run k (n,). level: constant without a meaning. clock: standard
-    deviation of the instants of rows against the motion, s. scatter: of the encoders by which the axis moved, row by row.
+    directions, which deflects the loop. unsure (n,) per run: uncertainty of rows in addition to the floor, 0 where it is not
+    given; misfit: rms residual in floors, at least 1, to which it is added. between (n, 2) per run: uncertainty by the
+    set-points between two rows, which no log holds. healthy: columns of the sizes that every axis has; inertia: those that
+    are force of inertia alone. covariates (n,) of the dictionary. response: what causes with their amplitudes (d,) add to the
+    channel of run k (n,). level: constant without a meaning. clock: standard deviation of the instants of rows against the
+    motion, s. scatter: of the encoders by which the axis moved, row by row.
     """
 
     channel: ChannelName

@@ -129,7 +129,9 @@ def ripple(
 
 
 def _sizes(waves: Floats, columns: Floats, left: Floats) -> tuple[list[float], Floats]:
-    """Amplitudes of pairs of waves (n, 2 m) in residuals (n,) of a fit of columns (n, k), jointly with these, and the new residuals (n,)."""
+    """Amplitudes (m,) of pairs of waves (n, 2 m), fitted to residuals (n,) jointly with the columns (n, k) whose fit left these,
+    and the new residuals (n,).
+    """
     apart = left_of_fit(columns, waves)
     c = np.linalg.lstsq(apart, left, rcond=None)[0]
     return [float(each) for each in np.hypot(c[::2], c[1::2])], left - apart @ c

@@ -34,6 +34,7 @@ _CLOCK = re.compile(  # 11.10.2022 15:06:48.043, 2022-10-11T15:06:48,043Z, 15:06
     re.ASCII,
 )
 _NANOSECONDS = re.compile(r"\d{19}", re.ASCII)  # since 1970, of this century
+_AT_2000 = 946_684_800_000_000_000  # ns since 1970
 _SINCE_1970 = ((1e12, 1e13, 1e-3), (1e15, 1e16, 1e-6))  # from, to, s: ms and us of this century
 
 
@@ -89,9 +90,9 @@ def seconds(stamps: Floats, factor: float | None) -> Floats | None:
 
 
 def clock(text: str) -> float | None:
-    """Seconds of a date with its time of day, of a time of day alone, or of ns since 1970; None for other texts."""
+    """Seconds since 2000 of a date with its time of day or of ns since 1970, or of a time of day alone; None for other texts."""
     if _NANOSECONDS.fullmatch(text.strip()):
-        return 1e-9 * int(text)
+        return 1e-9 * (int(text) - _AT_2000)
     found = _CLOCK.fullmatch(text.strip())
     if found is None:
         return None
