@@ -5,13 +5,12 @@ tolerance what every healthy machine has of it.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import SHARE_OF_SCALE, Bench, CandidateCause, Run, cause_of, step_of, thinned
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
@@ -24,15 +23,12 @@ from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.progress import steps
 from camcomp.model.axes import slides_of
-from camcomp.model.effect import Cause, Load, Parameter, applies
-from camcomp.model.statics.description import Link, Parallelogram, Robot
+from camcomp.model.effect import Parameter, applies
+from camcomp.model.statics.description import Robot
 
 RUN_OFFSET_N = 0.3
 CLOCK_JITTER_S = 1e-5  # of a clock, and of its second
-SPRING_LOG = 0.01  # one link's spring against its stated value
 MOST_HEALTHY = 0.3  # of an effect's typical size
-# tolerances beyond which it is no tolerance: at the tip no longer minor, by chance once in 5600
-FORCE_TURN_RAD = 0.005  # direction of the cutting force in the plane of the work
 
 
 def candidate_causes(robot: Robot, without: Sequence[str] = ()) -> list[CandidateCause]:
@@ -152,8 +148,6 @@ def build(
             size = healthy_size(bench, candidate, p, per_run, floor_um)
             found.append((i, p.sign, (f"{candidate.label}.{p.name}", size, per_run)))
     for name, size, per_run in _nuisances(bench):
-        if name.startswith("spring."):  # a soft machine has no more of it than of anything else
-            size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
         found.append((-1, 0, (name, size, per_run)))
     owner, sign, every = zip(*found, strict=True)
     names, tolerance, parts = zip(*every, strict=True)
@@ -233,7 +227,6 @@ def _nuisances(bench: Bench) -> list[Nuisance]:
         _by_label(found, bench, "clock", [(clock.parameters[0].name, ticks)])
         frames = candidate_columns(bench, frame, {})
         _by_label(found, bench, "clamping", [(p.name, f) for p, f in zip(frame.parameters, frames, strict=True)])
-    found += _allowances(bench)
     return found
 
 
@@ -244,51 +237,6 @@ def _by_label(found: list[Nuisance], bench: Bench, label: str, columns: Sequence
         for name, per_run in columns:
             masked = [f if mine == other else 0.0 * f for mine, f in zip(labels, per_run, strict=True)]
             found.append((label_name(label, other, name), np.inf, masked))
-
-
-def _allowances(bench: Bench) -> list[Nuisance]:
-    """Nuisances that allow for the usual errors of any model: springs of single chains, direction of the cutting
-    force.
-    """
-    found: list[Nuisance] = []
-    springs = [
-        (f"spring.{label}.{chain.name}", SPRING_LOG, _Stiffer(chain.name, part, spring))
-        for chain in bench.twin.robot.chains
-        for label, part, spring in (("links", Link, "stiffness"), ("bars", Parallelogram, "bar_stiffness"))
-        if any(isinstance(e, part) for e in chain.elements)
-    ]
-    allowed: list[tuple[str, float, object]] = [*springs] if len(springs) <= 12 else []
-    if any(np.abs(run.run_path.node_force).max(initial=0.0) > 0 for run in bench.runs):
-        allowed.append(("force.direction", FORCE_TURN_RAD, _Turn()))
-    for name, size, effect in allowed:
-        causes = [Cause(name, effect, None, {})]  # the name tells one changed machine from another
-        changes = [bench.change(k, bench.read(k, causes), bench.nominal[k]) for k in range(len(bench.runs))]
-        found.append((name, size, [change / SHARE_OF_SCALE for change in changes]))
-    return found
-
-
-@dataclass(frozen=True)
-class _Stiffer:
-    """The springs of one kind of part of a chain stiffer by SHARE_OF_SCALE of their logarithm."""
-
-    chain: str
-    part: Any
-    spring: str
-    PARAMETERS: ClassVar[tuple[Parameter, ...]] = ()
-
-    def on_robot(self, robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -> Robot:
-        f = float(np.exp(SHARE_OF_SCALE))
-        return robot.edit(self.part, lambda e: replace(e, **{self.spring: f * getattr(e, self.spring)}), self.chain)
-
-
-class _Turn:
-    """The cutting force turned by SHARE_OF_SCALE rad about machine z."""
-
-    PARAMETERS = ()
-
-    def on_load(self, load: Load, motion: object, p: Mapping[str, float]) -> Load:
-        c, s = np.cos(SHARE_OF_SCALE), np.sin(SHARE_OF_SCALE)
-        return Load(load.force @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), load.wrench)
 
 
 def grounds(bench: Bench) -> list[Ground]:

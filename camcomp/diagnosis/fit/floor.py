@@ -13,7 +13,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
 from camcomp.diagnosis.model.noise import LEAST_VALUES, REPEATABILITY_MM, resolution_of, rounding_noise
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Floats
 from camcomp.model.seams import missing_rows
 
 CLIPPED = 6.0  # robust deviations beyond which a difference of rows is no noise
@@ -22,7 +22,6 @@ RIGID_MM_PER_N = 1e-4  # spring of a drive for which none is stated
 STRETCH = 16  # differences of rows that make a stretch
 LOWER_QUARTILE = 0.82  # of the scatter of such stretches of white noise, in units of the noise (4000 draws: 0.816)
 UNSTEADY = 1.5  # times the quiet stretches: of 4000 draws of 160 rows of white noise none had it
-RAPID_TIMES = 2.0  # of the program's feed: rows that are faster are no measure of the instrument
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +43,7 @@ class NoiseFloor:
 
 def measure_floor(bench: Bench, stated_mm: float | None = None) -> NoiseFloor:
     """The floor of a bench's runs. stated_mm: the whole deviation of the tip's instrument per axis, where the user states it."""
-    gaps = [np.where(_fast(bench, k)[:, None], np.nan, bench.residual(k)) for k in range(len(bench.runs))]
+    gaps = [bench.residual(k) for k in range(len(bench.runs))]
     times = [thinned(run.run_path.time, run.thin) for run in bench.runs]
     fast = np.full(gaps[0].shape[1], np.nan)
     for c in range(len(fast)):
@@ -64,17 +63,6 @@ def measure_floor(bench: Bench, stated_mm: float | None = None) -> NoiseFloor:
         return NoiseFloor(fast, slow, 1e3 * np.sqrt(3.0) * axis, "stated")
     axis = float(np.hypot(white, REPEATABILITY_MM))
     return NoiseFloor(fast, REPEATABILITY_MM, 1e3 * np.sqrt(3.0) * axis, "rows" if len(tip) else "not identifiable")
-
-
-def _fast(bench: Bench, k: int) -> Bools:
-    """Rows (n,), thinned, of rapids: there a clock that is a little unsteady scatters more than the instrument."""
-    run = bench.runs[k]
-    if not run.run_path.ordered or len(run.run_path.time) < 3:
-        return np.zeros(len(bench.residual(k)), bool)
-    speed = 60.0 * np.linalg.norm(np.gradient(bench.nominal[k].tip, run.run_path.time, axis=0), axis=1)
-    fast = np.nan_to_num(speed) > RAPID_TIMES * np.nan_to_num(run.run_path.feed_mm_per_min, nan=np.inf)
-    found = thinned(fast.astype(float), run.thin) > 0.0
-    return found if found.mean() < 0.5 else np.zeros(len(found), bool)
 
 
 def row_scatter(values: Floats, time: Floats) -> float:
