@@ -95,13 +95,13 @@ def search_causes(problem: Problem) -> CauseSearch:
     """Fit sets, rank them, test the best one for an unmodelled effect, and state probabilities."""
     fitted = FittedSets(problem)
     ranked, temperature = _rank_answers(problem, fitted)
-    kept = _keep_causes(problem, ranked.best, fitted)
-    ranked = _with_answer(problem, ranked, kept.known, temperature)
-    stated = _stated(ranked, kept)
-    left = residual_tests(problem, kept.known, problem.prior if kept.kind is None else firm_prior(problem))
-    kind = kept.kind if kept.kind is None or kept.kind in left else next(iter(left))
+    known, credible, beyond, kind = _keep_causes(problem, ranked.best, fitted)
+    ranked = _with_answer(problem, ranked, known, temperature)
+    stated = _stated(ranked, credible, imitated=kind is not None or bool(above_floor(problem, beyond)))
+    left = residual_tests(problem, known, problem.prior if kind is None else firm_prior(problem))
+    kind = kind if kind is None or kind in left else next(iter(left))
     return CauseSearch(
-        sets=ranked, word=_verdict(ranked, stated, kind), stated=stated, left=left, unknown_in=kind, beyond=kept.beyond
+        sets=ranked, word=_verdict(ranked, stated, kind), stated=stated, left=left, unknown_in=kind, beyond=beyond
     )
 
 
@@ -120,27 +120,17 @@ def _rank_answers(problem: Problem, sets: FittedSets) -> tuple[RankedSets, float
     return rank(fits, probability, _same(problem, fits, best)), temperature
 
 
-@dataclass(frozen=True, eq=False)
-class _Kept:
-    """The answer that is kept jointly with an unmodelled effect, the probabilities of its members, and the excess
-    residual on held-out runs.
-
-    kind: of channel in which something unmodelled shows, None where none does. above_floor: whether the excess is above the
-    floor, though no more than what errors of the causes explain.
-    """
-
-    known: Fitted
-    credible: Mapping[int, float]
-    beyond: Mapping[str, Unexplained]
-    kind: str | None
-    above_floor: bool
-
-
-def _keep_causes(problem: Problem, best: Fitted, sets: FittedSets) -> _Kept:
+def _keep_causes(
+    problem: Problem, best: Fitted, sets: FittedSets
+) -> tuple[Fitted, Mapping[int, float], Mapping[str, Unexplained], str | None]:
     """Drop members of the best answer, one by one, that an unmodelled effect explains as well.
 
     Where one shows, members that do not predict withheld runs jointly with it are dropped first. What replaces a member
     above the size that counts shows, too.
+
+    Returns:
+        The answer that is kept, the probabilities of its members, the excess residual on held-out runs, and the kind of
+        channel in which something unmodelled shows, None where none does.
     """
     f, beyond = best, unexplained(problem, sets.fit(best.all_members))  # minor effects explain their part, too
     kind = at_first = unknown_kind(problem, best, beyond)
@@ -158,10 +148,10 @@ def _keep_causes(problem: Problem, best: Fitted, sets: FittedSets) -> _Kept:
         beyond = unexplained(problem, f)
         kind = unknown_kind(problem, f, beyond)
     if at_first is None and f.members and is_at_floor(problem, f):
-        return _Kept(sets.null, {}, beyond, None, False)
+        return sets.null, {}, beyond, None
     if kind is None and (at_first or instead):
         kind = worst(beyond).kind
-    return _Kept(f, present, beyond, kind, bool(above_floor(problem, beyond)))
+    return f, present, beyond, kind
 
 
 def _with_answer(problem: Problem, sets: RankedSets, known: Fitted, temperature: float) -> RankedSets:
@@ -173,17 +163,16 @@ def _with_answer(problem: Problem, sets: RankedSets, known: Fitted, temperature:
     return replace(sets, fits=fits, probability=probability, first=0, rivals=())
 
 
-def _stated(sets: RankedSets, kept: _Kept) -> dict[int, float]:
+def _stated(sets: RankedSets, credible: Mapping[int, float], *, imitated: bool) -> dict[int, float]:
     """Calibrated probability of every candidate: that all sets have it and that nothing unmodelled imitates it.
 
-    Where withheld runs exceed the floor causes share what the prior of a discrepancy of any form leaves.
+    imitated: whether withheld runs exceed the floor, where causes share what the prior of a discrepancy of any form leaves.
     """
     # the posterior of the sets lacks causes that are seen only jointly with something unmodelled
-    posterior = dict.fromkeys(kept.known.members, 1.0) | sets.inclusion
-    posterior = {i: min(p, kept.credible.get(i, 1.0)) for i, p in posterior.items()}
+    posterior = dict.fromkeys(credible, 1.0) | sets.inclusion
+    posterior = {i: min(p, credible.get(i, 1.0)) for i, p in posterior.items()}
     calibrate = calibration_of("programs").calibrate
-    open_to_others = kept.kind is not None or kept.above_floor
-    return {i: calibrate(with_discrepancy(p) if open_to_others else p) for i, p in posterior.items()}
+    return {i: calibrate(with_discrepancy(p) if imitated else p) for i, p in posterior.items()}
 
 
 def _verdict(sets: RankedSets, stated: Mapping[int, float], kind: str | None) -> Word:

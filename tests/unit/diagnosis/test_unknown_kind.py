@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.search.cause_search import _Kept, _stated, above_floor, unknown_kind
+from camcomp.diagnosis.search.cause_search import _stated, above_floor, unknown_kind
 from camcomp.diagnosis.search.unexplained import Unexplained
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 
@@ -26,9 +26,7 @@ def test_causes_that_undo_each_other_are_modelled_no_better_for_it(first, second
     assert above_floor(PROBLEM, beyond)
 
 
-@pytest.mark.parametrize(("kind", "above", "share"), [(None, False, 1.0), (None, True, 0.8), ("tip", True, 0.8)])
-def test_causes_whose_runs_exceed_the_floor_share_what_a_discrepancy_leaves(kind, above, share):
-    f = Fitted(members=(0, 1), theta=np.ones(2), covariance=np.eye(2), log_evidence=0.0, grams=())
-    ranked = SimpleNamespace(inclusion={0: 1.0, 2: 0.1})
-    stated = _stated(ranked, _Kept(f, {0: 1.0, 1: 0.6}, {}, kind, above))
+@pytest.mark.parametrize(("imitated", "share"), [(False, 1.0), (True, 0.8)])
+def test_causes_whose_runs_exceed_the_floor_share_what_a_discrepancy_leaves(imitated, share):
+    stated = _stated(SimpleNamespace(inclusion={0: 1.0, 2: 0.1}), {0: 1.0, 1: 0.6}, imitated=imitated)
     assert stated == pytest.approx({0: share, 1: 0.6 * share, 2: 0.1 * share}, abs=2e-4)
