@@ -27,7 +27,7 @@ from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.classes import MOST_SETS
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.next_experiment.designed import explore, propose
-from camcomp.diagnosis.next_experiment.proposal import ONLY_NOISE, Proposal, with_outcomes
+from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import (
     SOMETHING_UNKNOWN,
@@ -117,7 +117,7 @@ def diagnose(
     unseen = bool(withheld) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
     proposed = None if proposal is None else NextExperiment(
-        action=proposal.candidate.action, separates=tuple(proposal.separates), gain=round(proposal.gain, 4),
+        action=proposal.candidate.action, separates=proposal.separates, gain=round(proposal.gain, 4),
         minutes=round(proposal.candidate.minutes, 1), outcomes=proposal.outcomes,
     )  # fmt: skip
     outliers = tuple(
@@ -156,10 +156,7 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
         close += [j for j in np.argsort(-sets.probability).tolist() if j != best][: MOST_SETS - 1]
     # rivals explain equally well: a low prior does not exclude them
     p = np.ones(len(close)) if sets.rivals else sets.probability[close]
-    fits = [sets.fits[j] for j in close]
-    proposal = propose(problem, fits, p / p.sum(), job)
-    names = [" and ".join(_named(problem, i).label for i in f.members) or ONLY_NOISE for f in fits]
-    return None if proposal is None else with_outcomes(proposal, names)
+    return propose(problem, [sets.fits[j] for j in close], p / p.sum(), job)
 
 
 # -- causes -----------------------------------------------------------------------------------------------------------

@@ -6,8 +6,8 @@ information does not win. The search is deterministic.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from itertools import islice
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -18,33 +18,14 @@ from camcomp.diagnosis.next_experiment.candidates import (
     coarse,
     single_changes,
 )  # fmt: skip
-from camcomp.diagnosis.next_experiment.information_gain import most_narrowed, predicted_gain
+from camcomp.diagnosis.next_experiment.information_gain import predicted_gain
 from camcomp.diagnosis.next_experiment.predicted_logs import Question, predict_logs
-from camcomp.diagnosis.next_experiment.proposal import LEAST_BITS, Proposal, after_unknown
+from camcomp.diagnosis.next_experiment.proposal import LEAST_BITS, Proposal, after_unknown, outcomes_of
 from camcomp.diagnosis.next_experiment.ready_program import can_be_run
-from camcomp.diagnosis.next_experiment.site import site_of
+from camcomp.diagnosis.next_experiment.site import Site, site_of
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 from camcomp.model.job import Job
-
-MOST_JUDGED_WHOLE = 3  # best designs evaluated with every effect of the library within its tolerance
-
-
-def judged(question: Question, each: Candidate, *, whole: bool = False) -> Proposal | None:
-    """A candidate with its expected information about a question; None if it is infeasible or has no gain."""
-    there = predict_logs(question, each, whole=whole)
-    if there is None:
-        return None
-    found = predicted_gain(question, each, there, question.weight)
-    separates = separated(question.problem, question.rivals)
-    return Proposal(candidate=each, gain=found.gain, separates=separates, told=found)
-
-
-def separated(problem: Problem, rivals: Sequence[Fitted]) -> tuple[str, ...]:
-    """Effects in some rivals but not in all; for a single set all of its effects."""
-    sets = [set(f.members) for f in rivals]
-    common = set.intersection(*sets) if len(sets) > 1 else set()
-    return tuple(dict.fromkeys(problem.columns.candidates[i].name for s in sets for i in sorted(s - common)))
 
 
 def propose(problem: Problem, rivals: Sequence[Fitted], probability: Floats, job: Job) -> Proposal | None:
@@ -52,23 +33,31 @@ def propose(problem: Problem, rivals: Sequence[Fitted], probability: Floats, job
     if not any(f.members for f in rivals):
         return None
     question = Question(problem, rivals, probability, job)
-    if len(rivals) == 1 and most_narrowed(question, question.weight) <= LEAST_BITS:
+    separates, site = question.separates, question.site
+    useful = [
+        each for each in (*coarse(site), *by_other_means(site)) if all(effect in separates for effect, *_ in each.knows)
+    ]
+    return _best(problem, site, job, useful, partial(judged, question))
+
+
+def judged(question: Question, each: Candidate) -> Proposal | None:
+    """A candidate with its expected information about a question; None if it is infeasible or has no gain."""
+    there = predict_logs(question, each)
+    if there is None:
         return None
-    found = ranked(question, (*coarse(question.site), *by_other_means(question.site)))
+    found = predicted_gain(question, each, there)
+    outcomes = outcomes_of(found, each, question.names)
+    return Proposal(candidate=each, gain=found.gain, separates=question.separates, outcomes=outcomes)
+
+
+def _best(
+    problem: Problem, site: Site, job: Job, tried: Iterable[Candidate], judge: Callable[[Candidate], Proposal | None]
+) -> Proposal | None:
+    """The proposal of most value that tells more than it costs to set one up, of those that the machine can run."""
     bench = problem.bench
-    can = (each for each in found if can_be_run(each.candidate, bench.runs, job, bench.twin))
-    whole = [judged(question, each.candidate, whole=True) for each in islice(can, MOST_JUDGED_WHOLE)]
-    worth = [each for each in whole if each is not None and each.tells]
-    return max(worth, key=lambda each: each.value, default=None)
-
-
-def ranked(question: Question, tried: Iterable[Candidate]) -> list[Proposal]:
-    """Candidates that tell more than it costs to set one up, best first."""
-    names = separated(question.problem, question.rivals)
-    useful = (each for each in tried if all(effect in names for effect, *_ in each.knows))
-    every = (judged(question, each) for each in useful if question.site.holds(each.design.points()))
-    found = [each for each in every if each is not None and each.tells]
-    return sorted(found, key=lambda each: -each.value)
+    every = [judge(each) for each in tried if site.holds(each.design.points())]
+    worth = sorted((p for p in every if p is not None and p.gain > LEAST_BITS), key=lambda p: -p.value)
+    return next((p for p in worth if can_be_run(p.candidate, bench.runs, job, bench.twin)), None)
 
 
 def explore(problem: Problem, labels: Sequence[tuple[str, float]], job: Job) -> Proposal | None:
@@ -82,14 +71,13 @@ def explore(problem: Problem, labels: Sequence[tuple[str, float]], job: Job) -> 
         family = name.partition(":")[0]
         weight[family] = max(weight.get(family, 0.0), share)
     whole = sum(weight.values())
-    found = []
-    bench, site = problem.bench, site_of(problem.bench, job)
-    for each in single_changes(site):
+
+    def judge(each: Candidate) -> Proposal:
         p = sum(weight.get(family, 0.0) for family in each.varies) / whole if whole > 0 else 0.0
         gain = -float(sum(q * np.log2(q) for q in (p, 1.0 - p) if q > 0.0))
         others = [family for family in sorted(weight, key=lambda of: -weight[of]) if family not in each.varies]
         outcomes = after_unknown([v for v in each.varies if v in weight] or each.varies, others)
-        found.append(Proposal(candidate=each, gain=gain, separates=("unknown",), outcomes=outcomes))
-    found = sorted((each for each in found if each.tells), key=lambda each: -each.value)
-    can = (each for each in found if can_be_run(each.candidate, bench.runs, job, bench.twin))
-    return next((each for each in can if site.holds(each.candidate.design.points())), None)
+        return Proposal(candidate=each, gain=gain, separates=("unknown",), outcomes=outcomes)
+
+    site = site_of(problem.bench, job)
+    return _best(problem, site, job, single_changes(site), judge)

@@ -12,7 +12,6 @@ variance of predictions (I-optimality, Box and Draper 1959).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -50,20 +49,18 @@ class ExpectedGain:
         return self.separated + self.narrowed
 
 
-def predicted_gain(question: Question, candidate: Candidate, there: PredictedLogs, weight: Floats) -> ExpectedGain:
-    """Expected information of a predicted candidate. weight: (k, k) of the question."""
+def predicted_gain(question: Question, candidate: Candidate, there: PredictedLogs) -> ExpectedGain:
+    """Expected information of a predicted candidate."""
     problem, rivals, probability = question.problem, question.rivals, question.probability
-    kinds = [k for k in candidate.channels if k in there.signals]
-    columns = np.concatenate([there.columns[k] for k in kinds])
-    signals = np.concatenate([there.signals[k] for k in kinds])
-    ends = np.cumsum([0, *(len(there.signals[k]) for k in kinds)])
-    n = len(rivals)
+    kinds = list(dict.fromkeys(there.kinds.tolist()))
+    on = [there.kinds == kind for kind in kinds]
+    signals, n = there.signals, len(rivals)
     apart, by_kind, rests = np.zeros((n, n)), np.zeros((n, n, len(kinds))), np.zeros((n, n, len(kinds)))
-    own = weight[np.ix_(there.theirs, there.theirs)]
+    own = question.weight[np.ix_(there.theirs, there.theirs)]
     before = after = 0.0
     for j in range(n):
         half = there.reach[j]
-        D = columns @ half
+        D = there.columns @ half
         M = D.T @ D + np.eye(D.shape[1])
         mine = half[there.mine]
         before += probability[j] * float(np.sum((mine @ mine.T) * own))
@@ -74,28 +71,19 @@ def predicted_gain(question: Question, candidate: Candidate, there: PredictedLog
             gap = signals[:, i] - signals[:, j]
             move = np.linalg.solve(M, D.T @ gap)
             left = gap - D @ move
-            by_kind[i, j] = [seen_apart(signals[a:b][:, [i, j]], left[a:b]) for a, b in pairwise(ends)]
-            rests[i, j] = [np.sqrt(np.mean(left[a:b] ** 2)) if b > a else 0.0 for a, b in pairwise(ends)]
+            by_kind[i, j] = [seen_apart(signals[rows][:, [i, j]], left[rows]) for rows in on]
+            rests[i, j] = [np.sqrt(np.mean(left[rows] ** 2)) for rows in on]
             apart[i, j] = float(by_kind[i, j].sum()) + float(move @ move)
             apart[i, j] += _by_other_means(problem, rivals[i], rivals[j], candidate)
     noise = (1e-3 * problem.floor.tip_um) ** 2
-    k = int(np.argmax(by_kind.sum(axis=(0, 1)))) if kinds else 0
-    size = there.size[kinds[k]] if kinds else 0.0
-    a, b = (int(ends[k]), int(ends[k + 1])) if kinds else (0, 0)
+    k = int(np.argmax(by_kind.sum(axis=(0, 1))))
+    size = there.size[kinds[k]]
     return ExpectedGain(
         separated=expected_gain(apart, probability) if n > 1 else 0.0,
         narrowed=0.5 * float(np.log2((before + noise) / (after + noise))), before_um=1e3 * before**0.5,
-        after_um=1e3 * after**0.5, kind=kinds[k] if kinds else "",
-        shows=size * np.sqrt(np.mean(signals[a:b] ** 2, axis=0)) if b > a else np.zeros(n),
-        left=size * rests[:, :, k] if kinds else np.zeros((n, n)), apart=apart,
+        after_um=1e3 * after**0.5, kind=kinds[k], shows=size * np.sqrt(np.mean(signals[on[k]] ** 2, axis=0)),
+        left=size * rests[:, :, k], apart=apart,
     )  # fmt: skip
-
-
-def most_narrowed(question: Question, weight: Floats) -> float:
-    """Gain in bits if all parameters became certain."""
-    noise = (1e-3 * question.problem.floor.tip_um) ** 2
-    each = [float(np.sum(covariance * weight)) for _, covariance in question.beliefs]
-    return 0.5 * float(np.log2((float(np.dot(question.probability, each)) + noise) / noise))
 
 
 def _by_other_means(problem: Problem, truth: Fitted, other: Fitted, candidate: Candidate) -> float:

@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camcomp.diagnosis.experiment.driven_run import axes_along
 from camcomp.diagnosis.fit.bench import MOST_ROWS, Bench, Run
@@ -19,6 +20,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import HIDDEN, LARGE
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.site import Site, site_of
+from camcomp.diagnosis.result.types import NamedCause
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.gcode.interpret import read_program
@@ -29,6 +31,7 @@ from camcomp.model.job import Job
 from camcomp.model.motion.run_path import path_of_program
 from camcomp.model.motion.timeline import schedule
 
+ONLY_NOISE = "nothing but noise"  # the name of an empty set of causes
 WARMS_K = 5.0  # largest further drift of a temperature
 USUAL_NOISE = (0.002, 0.0005, 1.0, 2.0)  # mm, mm, N, N: default for unmeasured tip, encoders, drives, dynamometer
 
@@ -64,6 +67,22 @@ class Question:
         return tuple(out)
 
     @cached_property
+    def names(self) -> list[str]:
+        """The rivals in words."""
+        every = self.problem.columns.candidates
+        named = [
+            [NamedCause(effect=every[i].name, target=every[i].target).label for i in f.members] for f in self.rivals
+        ]
+        return [" and ".join(each) or ONLY_NOISE for each in named]
+
+    @cached_property
+    def separates(self) -> tuple[str, ...]:
+        """Effects in some rivals but not in all; of a single set all of its effects."""
+        sets = [set(f.members) for f in self.rivals]
+        common = set.intersection(*sets) if len(sets) > 1 else set()
+        return tuple(dict.fromkeys(self.problem.columns.candidates[i].name for s in sets for i in sorted(s - common)))
+
+    @cached_property
     def site(self) -> Site:
         """The regions of the runs and of feasible experiments."""
         return site_of(self.problem.bench, self.job)
@@ -89,45 +108,43 @@ class Question:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PredictedLogs:
-    """Predicted logs of a candidate with all channels, per kind of channel.
+    """Predicted logs of a candidate.
 
-    signals: whitened prediction (w, r) of each rival; columns: whitened derivatives (w, k) by uncertain amplitudes; reach:
-    per rival a square root (k, k) of their covariance; mine, theirs: indices of common columns here and in the problem;
-    size: standard deviation of a kind's rows, mm or N.
+    signals: white prediction (w, r) of each rival; columns: white derivatives (w, k) by uncertain amplitudes; kinds (w,): of
+    channel of every row; reach: per rival a square root (k, k) of the amplitudes' covariance; mine, theirs: indices of common columns
+    here and in the problem; size: standard deviation of a kind's rows, mm or N.
     """
 
-    signals: dict[str, Floats]
-    columns: dict[str, Floats]
+    signals: Floats
+    columns: Floats
+    kinds: NDArray[np.str_]
     reach: list[Floats]
     mine: Ints
     theirs: Ints
     size: dict[str, float]
 
 
-def predict_logs(question: Question, candidate: Candidate, *, whole: bool) -> PredictedLogs | None:
-    """Predicted logs of a candidate; None if it is infeasible, its cut is unknown, or the rivals are equal there.
-
-    whole: include every effect of the library within its tolerance, not only those of the question.
-    """
+def predict_logs(question: Question, candidate: Candidate) -> PredictedLogs | None:
+    """Predicted logs of a candidate; None if it is infeasible, its cut is unknown, or the rivals are equal there."""
     try:
-        return _lay(question, candidate, whole)
+        return _lay(question, candidate)
     except (CamcompError, ValueError):
         return None
 
 
-def _lay(question: Question, candidate: Candidate, whole: bool) -> PredictedLogs:
+def _lay(question: Question, candidate: Candidate) -> PredictedLogs:
     problem, rivals = question.problem, question.rivals
     bench = Bench(twin=problem.bench.twin, runs=[_run(problem, candidate, question.job)])
     nominal = bench.channels(0, bench.nominal[0])
     changes = [bench.channels(0, bench.read(0, problem.causes(f.members, f.theta, f.extra))) - nominal for f in rivals]
-    alone = _whitened(problem, bench, np.stack(changes, axis=2))
+    alone, kinds = _whitened(problem, bench, np.stack(changes, axis=2))
+    parts = [alone[kinds == kind] for kind in np.unique(kinds)]
     if len(rivals) > 1 and not candidate.knows and all(
         not seen_apart(each[:, [i, j]], each[:, i] - each[:, j])
-        for each in alone.values() for i, j in combinations(range(len(rivals)), 2)
+        for each in parts for i, j in combinations(range(len(rivals)), 2)
     ):  # fmt: skip
         raise ValueError("nothing to see")
-    every = problem.columns.candidates
-    some = range(len(every)) if whole else question.members
+    every, some = problem.columns.candidates, question.members
     shapes = {n: question.shapes[i] for n, i in enumerate(some) if i in question.shapes}
     columns = build(bench, [every[i] for i in some], shapes, problem.floor.tip_um)
     known = {name: i for i, name in enumerate(problem.columns.names)}
@@ -144,8 +161,8 @@ def _lay(question: Question, candidate: Candidate, whole: bool) -> PredictedLogs
     sigma = _noise(problem)
     size_of = {kind: float(np.sqrt(np.mean(sigma[problem.channels_of(kind)] ** 2))) for kind in KINDS}
     return PredictedLogs(
-        signals=_whitened(problem, bench, np.stack(signals, axis=2)), columns=_whitened(problem, bench, block),
-        reach=reach, mine=mine, theirs=theirs, size=size_of,
+        signals=_whitened(problem, bench, np.stack(signals, axis=2))[0], columns=_whitened(problem, bench, block)[0],
+        kinds=kinds, reach=reach, mine=mine, theirs=theirs, size=size_of,
     )  # fmt: skip
 
 
@@ -164,21 +181,16 @@ def _noise(problem: Problem) -> Floats:
     return np.where(known.any(axis=0), sigma, np.repeat(np.array(USUAL_NOISE), [3, m, m, 3]))
 
 
-def _whitened(problem: Problem, bench: Bench, values: Floats) -> dict[str, Floats]:
-    """Whitened rows (w, k) of values (n, c, k), per kind of channel."""
+def _whitened(problem: Problem, bench: Bench, values: Floats) -> tuple[Floats, NDArray[np.str_]]:
+    """White rows (w, k) of values (n, c, k), and the kind of channel (w,) of each."""
     noise = replace(problem.noise, sigma=_noise(problem)[None, :])
     inflate = np.sqrt(1.0 + (inflation(bench)[0] / noise.sigma) ** 2)
-    time = bench.runs[0].run_path.time
-    parts = {kind: problem.channels_of(kind) for kind in KINDS}
-    return {
-        kind: noise.rows(0, values[:, part], inflate, time, part.start)
-        for kind, part in parts.items()
-        if np.isfinite(inflate[:, part]).any()
-    }
+    kinds = np.array([problem.kind_of(c) for c in range(inflate.shape[1])])
+    return noise.rows(0, values, inflate, bench.runs[0].run_path.time), kinds[np.nonzero(np.isfinite(inflate).T)[0]]
 
 
 def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
-    """The candidate as a run with all channels; its logged channels are selected later."""
+    """The candidate as a run with its channels."""
     twin = problem.bench.twin
     path = read_program(candidate.program.encode(), name="candidate", dialect="rs274").path
     timeline = schedule(path, job.config.control.acceleration_mm_per_s2)
@@ -192,12 +204,13 @@ def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
         temperature=_temperature(problem, candidate.started + time),
     )  # fmt: skip
     n, m = len(time), len(twin.actuators)
-    nan = np.full(n, np.nan)
-    encoder = run_path.row_rho if "encoder" in candidate.channels else np.full((n, m), np.nan)
+    nan, logged = np.full(n, np.nan), dict.fromkeys(candidate.channels, 0.0)
+    tip, encoder, drive, dyno = (
+        logged.get(kind, np.nan) + np.zeros((n, 3 if kind in ("tip", "dyno") else m)) for kind in KINDS
+    )
     measured = Measured(
-        time=time, line=nan, tip=np.zeros((n, 3)), setpoint=np.full((n, m), np.nan), encoder=encoder,
-        drive=np.zeros((n, m)), load=np.full((n, m), np.nan), dyno=np.zeros((n, 3)), temperature=nan,
-        tip_sd=np.full((n, 3), np.nan),
+        time=time, line=nan, tip=tip, setpoint=np.full((n, m), np.nan), encoder=encoder + run_path.row_rho,
+        drive=drive, load=np.full((n, m), np.nan), dyno=dyno, temperature=nan, tip_sd=np.full((n, 3), np.nan),
     )  # fmt: skip
     by = _motion(problem, candidate)
     tips = twin.to_program(run_path.row_place.of(run_path.node_tip))

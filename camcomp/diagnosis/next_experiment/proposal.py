@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 from camcomp.diagnosis.law.words import listed
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE, MOST_SETS
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.design import SETUP_MIN
+from camcomp.diagnosis.next_experiment.information_gain import ExpectedGain
+from camcomp.diagnosis.next_experiment.predicted_logs import ONLY_NOISE
 from camcomp.report.plot import brief
 
-if TYPE_CHECKING:
-    from camcomp.diagnosis.next_experiment.information_gain import ExpectedGain
-
-ONLY_NOISE = "nothing but noise"  # the name of an empty set of causes
 _WHAT = {
     "tip": ("the tip is", 1e3, "µm"),
     "encoder": ("the encoders are", 1e3, "µm"),
@@ -29,19 +26,12 @@ LEAST_BITS = PRICE * SETUP_MIN  # an experiment has to tell more than it costs t
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Proposal:
-    """An experiment, the effects that it separates, its expected information; gain: bits. rivals: names of the sets."""
+    """An experiment, its expected information (bits), the effects that it separates, and what each outcome would mean."""
 
     candidate: Candidate
     gain: float
     separates: tuple[str, ...]
-    outcomes: tuple[str, ...] = ()
-    told: ExpectedGain | None = None
-    rivals: tuple[str, ...] = ()
-
-    @property
-    def tells(self) -> bool:
-        """Whether it tells more than it costs to set an experiment up."""
-        return self.gain > LEAST_BITS
+    outcomes: tuple[str, ...]
 
     @property
     def value(self) -> float:
@@ -49,27 +39,20 @@ class Proposal:
         return self.gain - PRICE * self.candidate.minutes
 
 
-def with_outcomes(proposal: Proposal, names: Sequence[str]) -> Proposal:
-    """The proposal with its outcomes; names: of the rival sets of causes, in their order."""
-    found = proposal.told
-    if found is None:
-        return proposal
+def outcomes_of(found: ExpectedGain, candidate: Candidate, names: Sequence[str]) -> tuple[str, ...]:
+    """What each outcome of a candidate would mean; names: of the rival sets of causes, in their order."""
     if len(names) == 1:
-        sentences = [
+        return (
             (
                 f"If no more than the noise is left on it with {names[0]} in the model, that holds; what stays uncertain then moves the tip by "
                 f"{_um(found.after_um)} (rms) on the runs' programs instead of {_um(found.before_um)}."
             ),
             "If more is left, something acts there that these runs did not show.",
-        ]
-    elif proposal.candidate.knows:
-        [(effect, *_)] = proposal.candidate.knows
-        sentences = [_by_hand(name, effect) for name in names[:MOST_SETS]]
-    else:
-        sentences = [_by_log(proposal, names, i) for i in range(min(len(names), MOST_SETS))]
-    if len(names) > 1:
-        sentences.append(NEITHER)
-    return replace(proposal, outcomes=tuple(sentences), rivals=tuple(names))
+        )
+    if candidate.knows:
+        [(effect, *_)] = candidate.knows
+        return (*(_by_hand(name, effect) for name in names[:MOST_SETS]), NEITHER)
+    return (*(_by_log(found, names, i) for i in range(min(len(names), MOST_SETS))), NEITHER)
 
 
 def _by_hand(name: str, effect: str) -> str:
@@ -78,9 +61,7 @@ def _by_hand(name: str, effect: str) -> str:
     return f"If it is as the machine file states, and the gap stays with --without {effect}, the cause is {name}."
 
 
-def _by_log(proposal: Proposal, names: Sequence[str], i: int) -> str:
-    found = proposal.told
-    assert found is not None
+def _by_log(found: ExpectedGain, names: Sequence[str], i: int) -> str:
     if names[i] == ONLY_NOISE:
         return "If nothing but noise is left on it, there is no cause."
     what, scale, unit = _WHAT[found.kind]

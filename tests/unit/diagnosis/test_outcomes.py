@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.next_experiment.information_gain import ExpectedGain
-from camcomp.diagnosis.next_experiment.proposal import NEITHER, ONLY_NOISE, Proposal, with_outcomes
+from camcomp.diagnosis.next_experiment.predicted_logs import ONLY_NOISE
+from camcomp.diagnosis.next_experiment.proposal import NEITHER, outcomes_of
 
 
 def outcomes(names, apart, left, *, knows=()):
@@ -21,8 +22,7 @@ def outcomes(names, apart, left, *, knows=()):
         left=np.array(left),
         apart=np.array(apart),
     )
-    proposal = Proposal(candidate=SimpleNamespace(knows=knows, minutes=3.0), gain=0.6, separates=(), told=told)
-    return with_outcomes(proposal, names).outcomes
+    return outcomes_of(told, SimpleNamespace(knows=knows), names)
 
 
 @pytest.fixture
