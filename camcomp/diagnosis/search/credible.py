@@ -26,11 +26,11 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.discrepancy import UNKNOWN, gains_at_scales
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.search.unknown import joint_products, process_in_time
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, parts_of
+from camcomp.diagnosis.statistics.cause_sets import Fitted, parts_of
 from camcomp.diagnosis.statistics.evidence import base, holding_back, log_bayes
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.diagnosis.statistics.probability import TEMPERATURE
-from camcomp.diagnosis.statistics.score_test import JointProducts
+from camcomp.diagnosis.statistics.score_test import projected
 from camcomp.ground.datatypes import Floats, Ints
 
 MODELLED = 0.1  # of what causes explain: none is modelled better than that
@@ -45,9 +45,11 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool) -> tuple[dict[int,
     if not members:
         return {}, {}
     weight = _weights(problem)
-    joint = joint_products(problem, f, weight)
-    alone = _alone(problem, f, joint.data, log(1.0 - UNKNOWN))
-    kinds = [_with_covariates(problem, f, joint, alone)]
+    joint, k = joint_products(problem, f, weight), len(problem.columns.names)
+    data = NormalEquations(joint.A[:k, :k], joint.b[:k], joint.c, joint.rows)
+    alone = _alone(problem, f, data, log(1.0 - UNKNOWN))
+    rows = sum(float((w**2).sum()) for w in weight)
+    kinds = [_with_covariates(problem, f, joint, alone, rows)]
     for power in (2.0, 1.0):
         scales = process_in_time(problem, f, weight, power)
         prior = log(UNKNOWN) - log(len(scales))
@@ -89,22 +91,24 @@ def _alone(problem: Problem, f: Fitted, data: NormalEquations, prior: float) -> 
 
 
 def _with_covariates(
-    problem: Problem, f: Fitted, joint: JointProducts, alone: Sequence[_Hypothesis]
+    problem: Problem, f: Fitted, joint: NormalEquations, alone: Sequence[_Hypothesis], rows: float
 ) -> list[_Hypothesis]:
-    """Every part of a set jointly with functions of every covariate."""
-    columns, theta, first, groups = problem.candidates.columns, list[Floats](), 0, covariates(joint)
+    """Every part of a set jointly with functions of every covariate; rows: number of white rows, each with its squared weight."""
+    columns, theta, first, k = problem.candidates.columns, list[Floats](), 0, len(problem.columns.names)
+    energy = np.diag(joint.A)[k:]
+    groups = [g for g in covariates(problem.dictionary.labels) if energy[g].any()]
     prior = log(UNKNOWN / (1.0 - UNKNOWN)) - log(max(len(groups), 1))
     for i in f.members:
         theta.append(f.theta[first : (first := first + len(columns[i]))])
     out = []
     for some, own in zip(parts_of(f.members), alone, strict=True):
-        P, h = joint.projected(problem.prior, problem.member_columns(some))
+        P, h = projected(joint, problem.prior, problem.member_columns(some))
         for g in groups:
             # a scale is the rms of all rows, in units of the noise
-            unit = float(np.sqrt(joint.rows / np.diag(joint.P)[g].sum()))
+            unit = float(np.sqrt(rows / energy[g].sum()))
             gains, amount = gains_at_scales(P[np.ix_(g, g)], h[g], unit)
             there = tuple(
-                has or float(_is_alike(joint, g, amount, columns[i], each))
+                has or float(_is_alike(joint.A, [*columns[i], *(k + g)], each, amount))
                 for has, i, each in zip(own.there, f.members, theta, strict=True)
             )
             gain = float(logsumexp(gains)) - float(np.log(len(gains)))
@@ -112,20 +116,18 @@ def _with_covariates(
     return out
 
 
-def covariates(joint: JointProducts) -> list[Ints]:
+def covariates(labels: Sequence[str]) -> list[Ints]:
     """Patterns (q,) of every covariate: of one actuator or axis, of all of them, and all that one of them does."""
-    words = [name.split(":") for name in joint.labels]
-    sorts = [list(joint.labels), [word for word, _ in words], [target for _, target in words]]
-    found = [np.flatnonzero(np.array(names) == each) for names in sorts for each in dict.fromkeys(names)]
-    return [g for g in found if np.diag(joint.P)[g].any()]
+    words = [name.split(":") for name in labels]
+    sorts = [list(labels), [word for word, _ in words], [target for _, target in words]]
+    return [np.flatnonzero(np.array(names) == each) for names in sorts for each in dict.fromkeys(names)]
 
 
-def _is_alike(joint: JointProducts, g: Ints, amount: Floats, columns: Members, theta: Floats) -> bool:
-    """Whether functions g with amplitudes (q,) do the same as columns (d,) at coordinates theta (d,)."""
-    on = np.array(columns)
-    own = float(theta @ joint.data.A[np.ix_(on, on)] @ theta)
-    apart = own - 2.0 * float(theta @ joint.B[np.ix_(on, g)] @ amount) + float(amount @ joint.P[np.ix_(g, g)] @ amount)
-    return apart < MODELLED**2 * own
+def _is_alike(gram: Floats, on: Sequence[int], theta: Floats, amount: Floats) -> bool:
+    """Whether the last of the columns `on`, with amplitudes (q,), do the same as the first at coordinates theta (d,)."""
+    own, apart = (np.concatenate([theta, sign * amount]) for sign in (0.0, -1.0))
+    A = gram[np.ix_(on, on)]
+    return float(apart @ A @ apart) < MODELLED**2 * float(own @ A @ own)
 
 
 def _weights(problem: Problem) -> list[Floats]:

@@ -13,9 +13,9 @@ from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SCALES
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
-from camcomp.diagnosis.statistics.evidence import Prior, estimate
-from camcomp.diagnosis.statistics.normal_equations import NormalEquations
-from camcomp.diagnosis.statistics.score_test import JointProducts, Shares, score_test
+from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
+from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
+from camcomp.diagnosis.statistics.score_test import Shares, projected, score_test
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
@@ -24,16 +24,15 @@ CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one ha
 
 def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, Shares]:
     """Score test on the residual of a set, per kind of channel; prior: of all other columns."""
-    joint = joint_products(problem, f)
-    return score_test(joint, *joint.projected(prior, problem.member_columns(f.members)))
+    joint = joint_products(problem, f, [np.ones(len(r)) for r in f.residual])
+    P, h = projected(joint, prior, problem.member_columns(f.members))
+    return score_test(P, h, problem.dictionary.labels, problem.dictionary.kinds)
 
 
-def joint_products(problem: Problem, f: Fitted, weight: Sequence[Floats] | None = None) -> JointProducts:
-    """Products of columns, residual and functions of covariates about a fit; weight: of the rows (w,), per run."""
-    return JointProducts.of(
-        problem.white_at(f), f.residual, patterns=problem.white_patterns, labels=problem.dictionary.labels, kinds=problem.dictionary.kinds,
-        weight=[np.ones(len(r)) for r in f.residual] if weight is None else weight,
-    )  # fmt: skip
+def joint_products(problem: Problem, f: Fitted, weight: Sequence[Floats]) -> NormalEquations:
+    """Normal equations of columns and, behind them, functions of covariates about a fit; weight: of the rows (w,), per run."""
+    every = zip(problem.white_at(f), problem.white_patterns, f.residual, weight, strict=True)
+    return sum_grams([gram(ByChannel.joined([W, D]).scaled(w), w * r) for W, D, r, w in every])
 
 
 def process_in_time(problem: Problem, f: Fitted, weight: Sequence[Floats], power: float) -> list[NormalEquations]:

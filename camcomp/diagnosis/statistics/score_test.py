@@ -7,12 +7,10 @@ with what chance makes of it (Rao's score test), and their evidence at a scale i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
-from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Prior, estimate_precision
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.ground.datatypes import Floats, Ints
@@ -20,56 +18,30 @@ from camcomp.ground.datatypes import Floats, Ints
 Shares = tuple[tuple[str, float], ...]  # covariates with the share that each carries alone, largest first
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class JointProducts:
-    """Products of columns (k), residual and patterns (p): data of the columns, B (k, p), h (p,), P (p, p); labels, kinds (p,).
-
-    rows: number of white rows, each with the square of its weight.
+def projected(joint: NormalEquations, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
+    """Normal equations (p, p), (p,) of the patterns behind the columns of a prior (k,), with the columns `members` free and all others
+    within tolerance.
     """
-
-    data: NormalEquations
-    B: Floats
-    h: Floats
-    P: Floats
-    labels: tuple[str, ...]
-    kinds: tuple[str, ...]
-    rows: float
-
-    @staticmethod
-    def of(
-        white: Sequence[ByChannel], residual: Sequence[Floats], patterns: Sequence[ByChannel], labels: Sequence[str],
-        kinds: Sequence[str], weight: Sequence[Floats],
-    ) -> JointProducts:  # fmt: skip
-        """Sum over runs of white columns (w, k), residuals (w,) and patterns (w, p); weight (w,): of the rows."""
-        k, whole = white[0].width, np.zeros((white[0].width + len(labels) + 1,) * 2)
-        for W, r, D, w in zip(white, residual, patterns, weight, strict=True):
-            own = ByChannel.joined([W, D]).appended(r[:, None]).scaled(w)
-            whole += own.T @ own
-        rows = float(sum((w**2).sum() for w in weight))
-        return JointProducts(
-            data=NormalEquations(whole[:k, :k], whole[:k, -1], float(whole[-1, -1]), round(rows)), B=whole[:k, k:-1], h=whole[k:-1, -1],
-            P=whole[k:-1, k:-1], labels=tuple(labels), kinds=tuple(kinds), rows=rows,
-        )  # fmt: skip
-
-    def projected(self, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
-        """Normal equations (p, p), (p,) of the patterns with the columns `members` free and all others within tolerance."""
-        M = self.data.A + np.diag(estimate_precision(prior, members))
-        size = 1.0 / np.sqrt(np.diag(M))
-        L = cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(M)), lower=True)
-        half = solve_triangular(L, size[:, None] * np.column_stack([self.B, self.data.b]), lower=True)
-        return self.P - half[:, :-1].T @ half[:, :-1], self.h - half[:, :-1].T @ half[:, -1]
+    k = len(prior.tolerance)
+    M = joint.A[:k, :k] + np.diag(estimate_precision(prior, members))
+    size = 1.0 / np.sqrt(np.diag(M))
+    L = cholesky(size[:, None] * M * size + 1e-12 * np.eye(k), lower=True)
+    half = solve_triangular(L, size[:, None] * np.column_stack([joint.A[:k, k:], joint.b[:k]]), lower=True)
+    return joint.A[k:, k:] - half[:, :-1].T @ half[:, :-1], joint.b[k:] - half[:, :-1].T @ half[:, -1]
 
 
-def score_test(joint: JointProducts, P: Floats, h: Floats) -> dict[str, Shares]:
+def score_test(P: Floats, h: Floats, labels: Sequence[str], kinds: Sequence[str]) -> dict[str, Shares]:
     """Shares of the energy beyond chance of the patterns of every kind of channel, the kind with most of it first.
 
-    P (p, p), h (p,): projected.
+    P (p, p), h (p,): projected; labels, kinds (p,): covariate of every pattern, and kind of the channel that it moves.
     """
     found = []
-    for kind in dict.fromkeys(joint.kinds):
-        mine = np.flatnonzero(np.array(joint.kinds) == kind)
+    for kind in dict.fromkeys(kinds):
+        mine = np.flatnonzero(np.array(kinds) == kind)
         own, b = P[np.ix_(mine, mine)], h[mine]
-        found.append((explained(own, b, np.arange(len(mine))), kind, _shares(own, b, [joint.labels[i] for i in mine])))
+        found.append(
+            (explained(own, b, np.arange(len(mine))), kind, _shares(own, b, [labels[i] for i in mine.tolist()]))
+        )
     return {kind: shares for _, kind, shares in sorted(found, key=lambda each: -each[0])}
 
 

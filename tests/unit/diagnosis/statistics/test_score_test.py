@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.evidence import Prior
-from camcomp.diagnosis.statistics.score_test import JointProducts, explained
+from camcomp.diagnosis.statistics.evidence import Prior, gram
+from camcomp.diagnosis.statistics.normal_equations import sum_grams
+from camcomp.diagnosis.statistics.score_test import explained, projected
 
 
 def test_a_pattern_given_twice_counts_once():
@@ -24,15 +25,11 @@ def test_normal_equations_of_patterns_are_those_of_the_stacked_rows(weight):
     D = [[rng.normal(size=(20, 2)), rng.normal(size=(10, 1))] for _ in range(2)]
     factor = [np.repeat(w, [20, 10]) for w in weight]
     blocks = [np.block([[a, np.zeros((20, 1))], [np.zeros((10, 2)), b]]) for a, b in D]
-    joint = JointProducts.of(
-        white=[ByChannel.of([w[:20], w[20:]]) for w in W],
-        residual=r,
-        patterns=[ByChannel.of([d[:20], d[20:]]) for d in blocks],
-        labels=["velocity:x", "velocity:y", "force:x"],
-        kinds=["tip", "tip", "drive"],
-        weight=factor,
-    )
-    P, h = joint.projected(prior, [0])
+    rows = [
+        gram(ByChannel.joined([ByChannel.of([w[:20], w[20:]]), ByChannel.of([d[:20], d[20:]])]).scaled(f), f * x)
+        for w, d, f, x in zip(W, blocks, factor, r, strict=True)
+    ]
+    P, h = projected(sum_grams(rows), prior, [0])
 
     every = np.concatenate([f[:, None] * w for f, w in zip(factor, W, strict=True)])
     left = np.concatenate([f * x for f, x in zip(factor, r, strict=True)])
@@ -41,4 +38,3 @@ def test_normal_equations_of_patterns_are_those_of_the_stacked_rows(weight):
     apart = np.column_stack([functions, left]) - every @ taken
     assert P == pytest.approx(functions.T @ apart[:, :3], abs=1e-9)
     assert h == pytest.approx(functions.T @ apart[:, 3], abs=1e-9)
-    assert joint.rows == pytest.approx(sum(float((f**2).sum()) for f in factor))
