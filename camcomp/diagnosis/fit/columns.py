@@ -10,10 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of, thinned
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
-from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
 from camcomp.diagnosis.fit.starts import Nuisance, start_columns
 from camcomp.diagnosis.model.noise import HEALTHY, MINOR, REPEATABILITY_MM
 from camcomp.diagnosis.statistics.by_channel import ByChannel
@@ -237,38 +236,3 @@ def _by_label(found: list[Nuisance], bench: Bench, label: str, columns: Sequence
         for name, per_run in columns:
             masked = [f if mine == other else 0.0 * f for mine, f in zip(labels, per_run, strict=True)]
             found.append((label_name(label, other, name), np.inf, masked))
-
-
-def grounds(bench: Bench) -> list[Ground]:
-    """What patterns are made of, per run, at the rows that are kept after thinning."""
-    out = []
-    for k, run in enumerate(bench.runs):
-        reading = bench.nominal[k]
-        keep = _middle_rows(run)
-        tip = reading.tip
-        velocity = (
-            np.gradient(tip, run.run_path.time, axis=0) if run.run_path.ordered and len(tip) > 2 else np.zeros_like(tip)
-        )
-        present = {n: run.measured.has(n) for n in ("tip", "encoder", "drive", "dyno")}
-        present["encoder"] &= run.by == "setpoint"  # else it is the motion itself
-        out.append(
-            Ground(
-                motion=reading.motion.at(keep),
-                drive=reading.drive[keep],
-                force=reading.dyno[keep],
-                tip=tip[keep],
-                velocity=velocity[keep],
-                present=present,
-            )
-        )
-    return out
-
-
-def _middle_rows(run: Run) -> np.ndarray:
-    n = len(run.run_path.time) // run.thin
-    return np.arange(n) * run.thin + run.thin // 2
-
-
-def patterns(bench: Bench) -> Dictionary:
-    """Generic patterns for all runs."""
-    return dictionary(grounds(bench), bench.actuators)

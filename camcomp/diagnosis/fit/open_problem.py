@@ -12,7 +12,6 @@ from camcomp.diagnosis.fit.columns import (
     candidate_columns,
     first_guess,
     healthy_size,
-    patterns,
     shape_default,
 )
 from camcomp.diagnosis.fit.floor import least_noise, measure_floor
@@ -21,7 +20,7 @@ from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, log_interv
 from camcomp.diagnosis.fit.label_offsets import with_scatter
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise
 from camcomp.diagnosis.fit.outliers import outlying, tails
-from camcomp.diagnosis.fit.patterns import Dictionary
+from camcomp.diagnosis.fit.patterns import Dictionary, dictionary
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.noise import HEALTHY, MINOR
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
@@ -63,7 +62,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
         problem = replace(problem, columns=with_scatter(columns, bench, mean))
     noise = _with_model_error(problem)
     problem = replace(problem, noise=noise, white=[])  # two sets of white columns at once are much memory
-    problem = _whitened(problem, patterns(bench))
+    problem = _whitened(problem, dictionary(bench))
     return _scanned(problem) if shapes else problem
 
 

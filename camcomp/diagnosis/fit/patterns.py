@@ -10,6 +10,7 @@ from itertools import product
 
 import numpy as np
 
+from camcomp.diagnosis.fit.bench import Bench
 from camcomp.diagnosis.fit.starts import STANDING_MM_PER_S
 from camcomp.diagnosis.model.discrepancy import ORDERS, smooth_functions
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM
@@ -20,20 +21,6 @@ from camcomp.model.effect import Motion
 _RELAX_MM = (0.5, 3.0)
 KINDS = ("tip", "encoder", "drive", "dyno")
 Functions = list[list[Floats]]  # (n,) per run and function
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Ground:
-    """What functions of one run are made of: motion at its rows (n), model drive force (n, m), model force (n, 3), place (n, 3) mm
-    and rate (n, 3) mm/s of the tip in the program frame, and which channels were measured.
-    """
-
-    motion: Motion
-    drive: Floats
-    force: Floats
-    tip: Floats
-    velocity: Floats
-    present: dict[str, bool]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,22 +54,20 @@ def _reversal(motion: Motion, length: float, j: int) -> Floats:
         return np.where(np.isfinite(last), 2.0 * np.exp(-(travelled - last) / length) * sign, 0.0)
 
 
-def _of_actuator(grounds: Sequence[Ground], j: int) -> dict[str, Functions]:
-    """Functions of the motion and force of actuator j, by covariate."""
-    motions = [g.motion for g in grounds]
+def _of_actuator(motions: Sequence[Motion], drives: Sequence[Floats], j: int) -> dict[str, Functions]:
+    """Functions of the motion and modelled force (n, m) of actuator j, by covariate."""
     rates = [np.gradient(m.speed[:, j], m.time) if m.ordered and len(m.time) > 2 else 0.0 * m.time for m in motions]
     return {
         "position": _smooth([m.encoder[:, j] for m in motions], 2 * ORDERS),
         "velocity": _smooth([m.speed[:, j] for m in motions]),
         "reversal": [[m.direction[:, j], *(_reversal(m, each, j) for each in _RELAX_MM)] for m in motions],
-        "force": _smooth([g.drive[:, j] for g in grounds]),
+        "force": _smooth([drive[:, j] for drive in drives]),
         "acceleration": _smooth(rates),
     }
 
 
-def _of_time(grounds: Sequence[Ground]) -> dict[str, Functions]:
+def _of_time(motions: Sequence[Motion]) -> dict[str, Functions]:
     """Functions of time (common clock, own time of a run, measured time one run after the other), and of temperature."""
-    motions = [g.motion for g in grounds]
     spent = [m.time - m.time[0] for m in motions]
     begin = np.concatenate([[0.0], np.cumsum([float(t[-1]) for t in spent])])
     clocks = [
@@ -96,19 +81,26 @@ def _of_time(grounds: Sequence[Ground]) -> dict[str, Functions]:
     }
 
 
-def _of_direction(g: Ground) -> list[Floats]:
-    """Functions (n,) of the feed direction in the plane of the workpiece."""
-    speed = np.linalg.norm(g.velocity, axis=1)
-    moving = speed > STANDING_MM_PER_S
-    angle = np.arctan2(g.velocity[:, 1], g.velocity[:, 0])
+def _of_direction(velocity: Floats) -> list[Floats]:
+    """Functions (n,) of the feed direction in the plane of the workpiece; velocity (n, 3) mm/s."""
+    moving = np.linalg.norm(velocity, axis=1) > STANDING_MM_PER_S
+    angle = np.arctan2(velocity[:, 1], velocity[:, 0])
     return [np.where(moving, f(k * angle), 0.0) for k in (1, 2) for f in (np.cos, np.sin)]
 
 
-def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> Dictionary:
-    """All functions of the channels that were measured, without those that are zero in every run; unit size is 1 um or 1 N."""
-    m, rows = len(actuators), [len(g.tip) for g in grounds]
+def dictionary(bench: Bench) -> Dictionary:
+    """All functions of the channels that were measured, at the rows that are kept after thinning, without those that are zero in
+    every run; unit size is 1 um or 1 N.
+    """
+    actuators, m = bench.actuators, len(bench.actuators)
+    motions, drives, forces, tips, turns = zip(*(_covariates(bench, k) for k in range(len(bench.runs))), strict=True)
+    rows = [len(tip) for tip in tips]
     first = dict(zip(KINDS, (0, 3, 3 + m, 3 + 2 * m), strict=True))
-    kinds = [kind for kind in KINDS if any(g.present[kind] for g in grounds)]
+    kinds = [
+        kind
+        for kind in KINDS
+        if any(run.measured.has(kind) and (kind != "encoder" or run.by == "setpoint") for run in bench.runs)
+    ]
     found: list[tuple[str, str, int, tuple[Floats, ...]]] = []
 
     def put(kind: str, label: str, channels: Iterable[int], functions: Functions) -> None:
@@ -119,27 +111,26 @@ def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> Dictionar
         found.extend((kind, label, first[kind] + channel, run) for run, channel in product(each, channels))
 
     for j, a in enumerate(actuators):
-        for name, functions in _of_actuator(grounds, j).items():
+        for name, functions in _of_actuator(motions, drives, j).items():
             for kind in kinds:
                 if kind != "dyno" and (kind, name) != ("encoder", "force"):
                     # a displaced carriage moves the tip in any direction
                     put(kind, f"{name}:{a}", range(3) if kind == "tip" else (j,), functions)
-    for name, functions in _of_time(grounds).items():
+    for name, functions in _of_time(motions).items():
         for kind in kinds:
             for channel, of in enumerate("xyz" if kind in ("tip", "dyno") else actuators):
                 put(kind, f"{name}:{of}", (channel,), functions)
-    turns = [_of_direction(g) for g in grounds]
     for axis, name in enumerate("xyz"):
-        loads = _smooth([g.force[:, axis] for g in grounds])
+        loads = _smooth([force[:, axis] for force in forces])
         for kind in [each for each in kinds if each in ("tip", "dyno")]:
-            put(kind, f"direction:{name}", (axis,), turns)
+            put(kind, f"direction:{name}", (axis,), list(turns))
             put(kind, f"force:{name}", range(3) if kind == "tip" else (axis,), loads)
         if "tip" in kinds:
             put(
                 "tip",
                 f"position:{name}",
                 range(3),
-                _smooth([g.tip[:, axis] for g in grounds], 2 * ORDERS, REPEATABILITY_MM),
+                _smooth([tip[:, axis] for tip in tips], 2 * ORDERS, REPEATABILITY_MM),
             )
     on = np.array([channel for *_, channel, _ in found], int)
     mine = [np.flatnonzero(on == channel) for channel in range(6 + 2 * m)]
@@ -149,3 +140,14 @@ def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> Dictionar
         each = np.stack([values[run] for *_, values in found], axis=1) * size if found else np.zeros((n, 0))
         blocks.append(ByChannel(len(found), tuple((own, each[:, own]) for own in mine)))
     return Dictionary(tuple(label for _, label, *_ in found), tuple(kind for kind, *_ in found), tuple(blocks))
+
+
+def _covariates(bench: Bench, k: int) -> tuple[Motion, Floats, Floats, Floats, list[Floats]]:
+    """Of run k at the rows (n,) that are kept after thinning: motion, modelled drive force (n, m), modelled force (n, 3), tip (n, 3) mm
+    in the program frame, and functions of its direction.
+    """
+    run, reading = bench.runs[k], bench.nominal[k]
+    path, tip = run.run_path, reading.tip
+    keep = np.arange(len(path.time) // run.thin) * run.thin + run.thin // 2
+    velocity = np.gradient(tip, path.time, axis=0) if path.ordered and len(tip) > 2 else np.zeros_like(tip)
+    return reading.motion.at(keep), reading.drive[keep], reading.dyno[keep], tip[keep], _of_direction(velocity[keep])

@@ -1,15 +1,17 @@
 """Patterns of the covariates of a residual: runs need not have logged the same."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
-from camcomp.diagnosis.fit.patterns import Ground, dictionary
+from camcomp.diagnosis.fit.patterns import dictionary
 from camcomp.model.effect import Motion
 
 ROWS = 50
 
 
-def ground(temperature):
-    """One run of a drive that moves evenly."""
+def run(temperature):
+    """One run of a drive that moves evenly, and its readings."""
     time = np.linspace(0.0, 5.0, ROWS)
     place = 10.0 * time[:, None]
     still = np.zeros_like(place)
@@ -25,20 +27,17 @@ def ground(temperature):
         stiffness=np.full(1, np.inf),
         ordered=True,
     )
-    tip = np.column_stack([place, still, still])
-    measured = {"tip": True, "encoder": False, "drive": False, "dyno": False}
-    return Ground(
-        motion=motion,
-        drive=still,
-        force=np.zeros((ROWS, 3)),
-        tip=tip,
-        velocity=np.gradient(tip, time, axis=0),
-        present=measured,
+    measured = SimpleNamespace(has=lambda kind: kind == "tip")
+    path = SimpleNamespace(time=time, ordered=True)
+    reading = SimpleNamespace(
+        tip=np.column_stack([place, still, still]), motion=motion, drive=still, dyno=np.zeros((ROWS, 3))
     )
+    return SimpleNamespace(run_path=path, thin=1, measured=measured, by="encoder"), reading
 
 
 def test_a_run_without_temperatures_says_nothing_of_them():
-    tip = dictionary([ground(np.linspace(20.0, 25.0, ROWS)), ground(None)], ["x"])
+    runs, nominal = zip(run(np.linspace(20.0, 25.0, ROWS)), run(None), strict=True)
+    tip = dictionary(SimpleNamespace(runs=runs, nominal=nominal, actuators=("x",)))
     warm = [n for n, label in enumerate(tip.labels) if label.startswith("temperature")]
     assert warm
     assert np.abs(tip.blocks[0][:, warm]).max() > 0.0
