@@ -10,6 +10,7 @@ from camcomp.diagnosis.fit.columns import candidate_columns
 from camcomp.diagnosis.fit.gap import floor_um, main_channels, square_lengths
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.model.folds import without_nuisances
 from camcomp.diagnosis.result.types import UnseenShrinkage
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground import shelf
@@ -29,9 +30,12 @@ def shrinkage_of(problem: Problem, best: Fitted, seen: Bench, chosen: Sequence[M
     def squares(count: int) -> list[Floats]:
         """With so many members of the answer, as far as they were chosen; with all of them, all that was."""
         these = [[c for i, c in each.items() if count == len(members) or i in members[:count]] for each in chosen]
-        return [
-            square_lengths(gap) for gap in _without([seen.gap(k, each)[:, part] for k, each in enumerate(these)], free)
-        ]
+        gaps = [seen.gap(k, each)[:, part] for k, each in enumerate(these)]
+        if free:  # over all runs together
+            columns = np.stack([np.concatenate(each) for each in free], axis=2)
+            left = without_nuisances(np.concatenate(gaps), columns)
+            gaps = np.split(left, np.cumsum([len(gap) for gap in gaps])[:-1])
+        return [square_lengths(gap) for gap in gaps]
 
     per_step = [squares(count) for count in range(len(members) + 1)]
     candidates = [problem.columns.candidates[i] for i in members]
@@ -61,14 +65,3 @@ def _nuisances(seen: Bench, fitted: Sequence[Run], part: slice) -> tuple[list[li
             named += [f"{what} of {run.name} ({label} {other})" for run, on in zip(seen.runs, mine, strict=True) if on]
             found += [[on * own[:, part] for own, on in zip(each, mine, strict=True)] for each in columns]
     return found, named
-
-
-def _without(gaps: Sequence[Floats], free: Sequence[Sequence[Floats]]) -> list[Floats]:
-    """Gaps minus their least-squares fit by the free columns, over all runs together."""
-    if not free:
-        return list(gaps)
-    every = np.concatenate(gaps)
-    columns = np.stack([np.concatenate(each) for each in free], axis=2)
-    known = np.isfinite(every)
-    left = every - columns @ np.linalg.lstsq(columns[known], every[known], rcond=1e-9)[0]
-    return np.split(left, np.cumsum([len(gap) for gap in gaps])[:-1])

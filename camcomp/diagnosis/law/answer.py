@@ -31,9 +31,9 @@ class LawAnswer:
     """
 
     law: Law
-    before: tuple[Floats, ...]
-    gaps: tuple[Floats, ...]
-    signal: tuple[Floats, ...]
+    before: list[Floats]
+    gaps: list[Floats]
+    signal: list[Floats]
     found: FoundLaw
     problem: Problem
     fit: Fitted
@@ -42,19 +42,6 @@ class LawAnswer:
 def term_bench(problem: Problem) -> TermBench:
     """Where terms are evaluated for a problem."""
     return TermBench(problem.bench, problem.noise, problem.inflate, problem.times)
-
-
-@dataclass(frozen=True, eq=False)
-class _Tried:
-    """A law or map fitted jointly with the causes of f, or alone where f is None; gaps and signal as in LawAnswer;
-    after: rms, um.
-    """
-
-    f: Fitted | None
-    found: FoundLaw
-    gaps: list[Floats]
-    signal: list[Floats]
-    after: float
 
 
 def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
@@ -77,7 +64,8 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
     def smooth(own: Fitted | None) -> FoundLaw | None:
         return find_map(bench, _base(problem, own, bench, kind)(usual_split(len(problem.bench.runs)), False), kind)
 
-    best, after = None, before
+    best: tuple[FoundLaw, Fitted | None] | None = None
+    after = before
     # what is small without the causes may be the usual small errors
     for k, (own, find, asked) in enumerate(
         ((f, formula, True), (None, formula, room > floor), (f, smooth, kind == "tip"))
@@ -85,23 +73,21 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
         much = after**2 - floor**2 > (ABOVE - 1.0) * max(floor, room) ** 2
         if k and not (asked and much):
             continue
-        found = find(own)
-        tried = None if found is None else _beside(problem, own, bench, found)
-        if tried is not None and tried.after < BETTER * after:
-            best, after = tried, tried.after
+        tried = find(own)
+        left = np.inf if tried is None else rms_um(*_beside(problem, own, bench, tried))
+        if tried is not None and left < BETTER * after:
+            best, after = (tried, own), left
     if best is None:
         return None
-    joint = with_law(problem, bench, best.found)
+    found, own = best
+    joint = with_law(problem, bench, found)
     fit = fit_needed(joint, f.members)
-    if best.f is not None or fit.members:  # about the values that the causes have beside it
-        base = _base(problem, fit, bench, kind)(best.found.folds.split, False)
-        best = _beside(problem, fit, bench, replace(best.found, folds=base))
+    if own is not None or fit.members:  # about the values that the causes have beside it
+        own, found = fit, replace(found, folds=_base(problem, fit, bench, kind)(found.folds.split, False))
+    gaps, signal = _beside(problem, own, bench, found)
     without = _gaps(problem, f if fit.members == f.members else problem.refit(fit.members))
-    law = law_result(bench, best.found, rms_um(without), best.after)
-    return LawAnswer(
-        law=law, before=tuple(without), gaps=tuple(best.gaps), signal=tuple(best.signal), found=best.found,
-        problem=joint, fit=fit,
-    )  # fmt: skip
+    law = law_result(bench, found, rms_um(without), rms_um(gaps, signal))
+    return LawAnswer(law=law, before=without, gaps=gaps, signal=signal, found=found, problem=joint, fit=fit)
 
 
 def _base(problem: Problem, f: Fitted | None, bench: TermBench, kind: str) -> Callable[[Split, bool], Folds]:
@@ -135,14 +121,14 @@ def _gap(problem: Problem, f: Fitted, k: int, theta: Floats) -> Floats:
     return problem.bench.gap(k, problem.causes(f.members, theta, f.extra))[:, :3]
 
 
-def _beside(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw) -> _Tried:
-    """Gaps and tip motion of a law, with the values of the causes that were fitted jointly with it."""
+def _beside(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw) -> tuple[list[Floats], list[Floats]]:
+    """Gaps and signal, as in LawAnswer, of a law fitted jointly with the causes of f, or alone where f is None."""
     signal, gaps = moved_without(bench, found), _gaps(problem, None)
     if f is not None and f.members:
         theta = found.folds.means(found.columns, found.precision)[:, problem.member_columns(f.members)]
         whole = found.folds.split.parts == 1  # runs are withheld
         gaps = [_gap(problem, f, k, theta[1 + k] if whole else theta[0]) for k in range(len(problem.bench.runs))]
-    return _Tried(f, found, gaps, signal, rms_um(gaps, signal))
+    return gaps, signal
 
 
 def rms_um(gaps: Sequence[Floats], signal: Sequence[Floats] = ()) -> float:

@@ -57,36 +57,32 @@ def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[dict[str, 
         step = max(float(np.median(np.diff(t))) for _, t, *_ in parts)
         tried = np.arange(0.5 * _TREND / min(spans), 1.0 / (2.0 * step), 0.25 / max(spans))
         if (line := _line(parts, tried, len(names))) is not None:
-            size = 1e3 * float(np.mean([abs(_wave(y, t, line[0])) for y, t, *_ in parts]))
-            share = round(line[1] / max(whole, 1e-300), 4)
-            found.append({"axis": name, "hertz": round(line[0], 4), "amplitude_um": round(size, 3), "share": share})
+            hertz, energy = line
+            size = 1e3 * float(np.mean([np.sqrt(2.0 * e / len(y)) for e, (y, *_) in zip(energy, parts, strict=True)]))
+            share = round(sum(energy) / max(whole, 1e-300), 4)
+            found.append({"axis": name, "hertz": round(hertz, 4), "amplitude_um": round(size, 3), "share": share})
     return sorted(found, key=lambda line: -line["share"])
 
 
 def _line(
     parts: Sequence[tuple[Floats, Floats, float, Floats]], tried: Floats, names: int
-) -> tuple[float, float] | None:
-    """The best of the frequencies tried (f,), and the energy of its sines, if chance and trends do not make it.
+) -> tuple[float, list[float]] | None:
+    """The best of the frequencies tried (f,), and the energy of its sines per series, if chance and trends do not make it.
 
     parts: per series values (n,), places (n,), rows per independent one, trend (n, k). names: number of actuators or axes.
     """
     if not len(tried):
         return None
-    logs, energies, shares = np.zeros(len(tried)), np.zeros(len(tried)), list[Floats]()
+    logs, energies, shares = np.zeros(len(tried)), list[Floats](), list[Floats]()
     for y, x, thin, trend in parts:
         explained, energy = _spectrum(y, x, tried, trend)
         left = np.clip(1.0 - explained / max(energy, 1e-300), 1e-12, 1.0)
         logs += 0.5 * max(len(y) / thin - 2.0, 0.0) * np.log(left)  # chance that noise leaves so little unexplained
         shares.append(explained / max(energy, 1e-300))
-        energies += explained
+        energies.append(explained)
     common = np.median(shares, axis=0)
     best = int(np.argmax(common))
     chance = logs[best] + np.log(len(tried) * names)
-    return None if common[best] < _STANDS_OUT or chance > np.log(FALSE) else (float(tried[best]), float(energies[best]))
-
-
-def _wave(y: Floats, x: Floats, f: float) -> complex:
-    """Amplitude and phase of the sine at frequency f in y (n,) over x (n,), fitted jointly with a trend."""
-    columns = np.column_stack([np.sin(2 * np.pi * f * x), np.cos(2 * np.pi * f * x), _trend(x)])
-    a = np.linalg.lstsq(columns, y, rcond=1e-9)[0]
-    return complex(a[0], a[1])
+    if common[best] < _STANDS_OUT or chance > np.log(FALSE):
+        return None
+    return float(tried[best]), [float(each[best]) for each in energies]
