@@ -62,7 +62,7 @@ def _gains(
         if columns is None:
             return None
         white = [whitened(k, each) for k, each in enumerate(columns)]
-        G, h = base.alone(white, base.products(white, own))
+        G, h = base.alone(white, own)
         G = G + np.eye(own) / PRIOR_WIDTHS[-1] ** 2
         gains.append(np.einsum("vp,vp->v", h, np.linalg.solve(G, h[:, :, None])[:, :, 0]))
     return np.concatenate(gains)

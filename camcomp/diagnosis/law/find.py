@@ -15,7 +15,7 @@ import numpy as np
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, TermRows, spots
 from camcomp.diagnosis.law.forms import Form, Sizes, SmoothForm
-from camcomp.diagnosis.law.screen import Screen, TermGrid
+from camcomp.diagnosis.law.screen import TermGrid, gains_of_terms
 from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.model.discrepancy import ORDERS
 from camcomp.diagnosis.model.noise import MINOR
@@ -95,7 +95,6 @@ class _Search:
         self.base, self.split = base, usual_split(len(bench.row_counts))
         self.folds = base(self.split, True)
         self.bench, self.grids, self.floor_mm = bench, grids, floor_mm
-        self.screen = Screen(bench, grids, self.folds)
         self.shapes = Shapes(bench)
         self.per_term = float(np.log(len({Term(s, f).kind for grid in grids for s in grid.spots for f in grid.forms})))
 
@@ -105,7 +104,7 @@ class _Search:
         score = 0.0
         while len(chosen) < MOST:
             step = self._beside(chosen)
-            ranked = [each for each in self.screen.gains(step) if each[0] > 0.0]
+            ranked = [each for each in gains_of_terms(self.bench, self.grids, step) if each[0] > 0.0]
             fine = [self._refined(step, term) for _, term in self._leaders(ranked)]
             # the other spots at which the same function of the same covariates can act
             where = [(t, s) for t in chosen for each in self.grids if t.spot in each.spots for s in each.spots]

@@ -93,7 +93,7 @@ class Shapes:
         """Log evidence (f,) that forms of as many functions each add, each alone."""
         values, count = self.bench.values(spot, *forms), forms[0].size
         white = self.bench.white(spot, values)
-        return gains(*step.alone(white, step.products(white, count)), self.bench.precision(spot, values, count))
+        return gains(*step.alone(white, count), self.bench.precision(spot, values, count))
 
 
 def _moved(form: Form, i: int, at: float) -> Form:

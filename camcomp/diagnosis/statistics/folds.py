@@ -44,19 +44,6 @@ def usual_split(runs: int) -> Split:
     return Split(each, each)
 
 
-@dataclass(frozen=True, eq=False)
-class Products:
-    """Columns (c) of a spot, of which each `count` belong together, with base columns (k): cross (k, c); with the residual:
-    target (c,); with each other: own (c / count, count, count). more: how many columns that stand apart are in the base.
-    """
-
-    cross: Floats
-    target: Floats
-    own: Floats
-    count: int
-    more: int
-
-
 class Folds:
     """The base of a law search: white columns and residual beside which laws are sought.
 
@@ -128,24 +115,15 @@ class Folds:
         each = np.asarray(np.linalg.solve(M, h[..., None])[..., 0], float)
         return each, np.asarray(np.linalg.inv(M[0]), float)
 
-    def products(self, x: RunColumns, count: int) -> Products:
-        """Products of columns of a spot with the base: they serve every larger base, too."""
+    def alone(self, x: RunColumns, count: int) -> tuple[Floats, Floats]:
+        """Columns (c) of a spot, of which each `count` belong together, with the base taken out, all data: G (f, count, count), h (f,
+        count).
+        """
+        base = [np.sum([W.T @ X for W, X in zip(own, x, strict=True)], axis=0) for own in (self.white, *self.more)]
+        half = solve_triangular(self._halves[0], np.concatenate(base), lower=True)
         target = np.sum([X.T @ r for X, r in zip(x, self.residual, strict=True)], axis=0)
         own = _grams([values for each in x for on, values in each.parts if len(on)], count)
-        return Products(self._cross([self.white, *self.more], x), np.asarray(target), own, count, len(self.more))
-
-    def alone(self, x: RunColumns, products: Products) -> tuple[Floats, Floats]:
-        """Columns (c) with the base taken out, all data: G (f, count, count) and h (f, count) of those that belong together."""
-        cross = np.concatenate([products.cross, self._cross(self.more[products.more :], x)])
-        half = solve_triangular(self._halves[0], cross, lower=True)
-        h = (products.target - half.T @ self._targets[0]).reshape(-1, products.count)
-        return products.own - _grams([half], products.count), h
-
-    @staticmethod
-    def _cross(base: Sequence[RunColumns], x: RunColumns) -> Floats:
-        """Products (k, c) of columns of the base with columns of a spot, over all runs."""
-        each = [np.sum([W.T @ X for W, X in zip(own, x, strict=True)], axis=0) for own in base]
-        return np.concatenate([np.zeros((0, x[0].width)), *each])
+        return own - _grams([half], count), (target - half.T @ self._targets[0]).reshape(-1, count)
 
     def together(self, xs: Sequence[RunColumns]) -> tuple[Floats, Floats]:
         """Columns (c) of several spots, one behind the other, with the base taken out, for all data and for all but one part
