@@ -26,8 +26,7 @@ from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.classes import MOST_SETS
 from camcomp.diagnosis.model.noise import MINOR
-from camcomp.diagnosis.next_experiment.designed import explore, propose
-from camcomp.diagnosis.next_experiment.proposal import Proposal
+from camcomp.diagnosis.next_experiment.designed import Proposal, explore, propose
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import (
     SOMETHING_UNKNOWN,

@@ -18,7 +18,6 @@ from camcomp.compensation.program.moves import travel_of
 from camcomp.compensation.set_points.stream import Stream
 from camcomp.diagnosis.arm.poses import ArmBench, Poses, combined
 from camcomp.diagnosis.fit.bench import CandidateCause
-from camcomp.diagnosis.fit.grid_parameters import quick_columns
 from camcomp.gcode.interpret import read_program
 from camcomp.ground import shelf
 from camcomp.model import signal_path
@@ -350,7 +349,7 @@ def test_poses_of_an_arm_and_the_model_along_a_program_agree():
 @pytest.mark.parametrize("hook", [hook for hook in signal_path.HOOKS if hook not in ("on_drive", "on_drive_force")])
 def test_an_effect_of_drives_and_more_takes_no_short_cut_through_the_twin(hook):
     effect = SimpleNamespace(on_drive=None, PARAMETERS=(), **{hook: None})
-    assert quick_columns(None, CandidateCause("planted", "x", effect), [{}]) is None
+    assert not CandidateCause("planted", "x", effect).of_drive_alone
 
 
 # Files that may name a hook: the path itself, the effects, and what users' effects are held against, which tells what hooks

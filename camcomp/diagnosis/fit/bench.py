@@ -17,7 +17,7 @@ from camcomp.model.effect import Cause, Parameter, public_values
 from camcomp.model.motion.loaded_structure import Slopes, Solved, rows_together
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Reading, Twin
-from camcomp.model.signal_path import fitted_parameters
+from camcomp.model.signal_path import fitted_parameters, stages_of
 from camcomp.model.statics.arm import ARM_LENGTH
 
 SHARE_OF_SCALE = 0.05  # step of a difference, or of the logarithm of a spring or a force
@@ -53,6 +53,11 @@ class CandidateCause:
     def switches(self) -> tuple[Parameter, ...]:
         """The shapes that are one of a few values."""
         return tuple(p for p in fitted(self) if p.either)
+
+    @property
+    def of_drive_alone(self) -> bool:
+        """Whether it acts between encoder and carriage only, so that columns come straight from its hooks."""
+        return stages_of(self.effect) == {"drive"}
 
     @property
     def label(self) -> str:

@@ -2,15 +2,12 @@
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import CandidateCause, cause_of
-from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
+from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
-from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
-from camcomp.model.effect import Cause
 
 
 def main_channels(problem: Problem) -> slice:
@@ -24,8 +21,17 @@ def main_channels(problem: Problem) -> slice:
 
 def gap_sizes(problem: Problem, f: Fitted) -> Floats:
     """Length (n,), um, of the gap at all known rows of all runs, with the offsets of labels from the fit f removed."""
-    part = main_channels(problem)
-    gaps = [problem.bench.gap(k, of_labels)[:, part] for k, of_labels in enumerate(_label_causes(problem, f))]
+    part, labels = main_channels(problem), problem.columns.of_labels
+    offset = estimate(f.data, problem.prior, problem.member_columns(f.members))[0][labels]
+    gaps = []
+    for k, run in enumerate(problem.bench.runs):
+        gap = problem.bench.gap(k)[:, part]
+        if len(labels) and part.start == 0:
+            moved = (problem.columns.blocks[k][:, labels] @ offset).reshape(-1, len(gap))[:3].T
+            if run.turn is not None:  # along the path nothing is known of it
+                moved = np.einsum("nji,nj->ni", thinned(run.turn[:, 1:], run.thin), moved[:, 1:])
+            gap = gap - moved
+        gaps.append(gap)
     size = np.sqrt(np.concatenate([square_lengths(g) for g in gaps]))
     return np.asarray(size[np.isfinite(size)] * 1e3)
 
@@ -34,24 +40,6 @@ def square_lengths(gap: Floats) -> Floats:
     """Squared length (n,) of a gap (n, c) over the channels that the run has; NaN where one of them is missing."""
     here = np.isfinite(gap).any(axis=0)
     return np.asarray(np.sum(gap[:, here] ** 2, axis=1)) if here.any() else np.full(len(gap), np.nan)
-
-
-def _label_causes(problem: Problem, f: Fitted) -> list[list[Cause]]:
-    """Per run what its clamping and its clock do by themselves, where they are labelled."""
-    found: list[list[Cause]] = [[] for _ in problem.bench.runs]
-    if not len(problem.columns.of_labels):
-        return found
-    usual = estimate(f.data, problem.prior, problem.member_columns(f.members))[0]
-    amplitude = dict(zip(problem.columns.names, usual, strict=True))
-    for label, effect in EFFECT_OF.items():
-        candidate = CandidateCause(effect, None, shelf.load("effects", effect))
-        own = apart([getattr(run, label) for run in problem.bench.runs])
-        for causes, run in zip(found, problem.bench.runs, strict=True):
-            each = getattr(run, label)
-            if each in own:
-                at = {p.name: float(amplitude[label_name(label, each, p.name)]) * p.scale for p in candidate.parameters}
-                causes.append(cause_of(candidate, at))
-    return found
 
 
 def is_at_floor(problem: Problem, f: Fitted) -> bool:

@@ -20,19 +20,17 @@ _FINER = 17  # values between the neighbours of the best
 White = Callable[[int, ByChannel], ByChannel]  # what makes columns of a run white
 
 
-def best_shape(bench: Bench, candidate: CandidateCause, base: Folds, whitened: White) -> dict[str, float] | None:
-    """The scanned shape whose columns explain most of the residual; None where the effect is not scanned."""
+def best_shape(bench: Bench, candidate: CandidateCause, base: Folds, whitened: White) -> dict[str, float]:
+    """The scanned shape of an effect of the drive alone whose columns explain most of the residual."""
     p = candidate.shapes[0]
     values = np.asarray(p.scan)
     values = np.sort(values[values <= max(longest(bench, candidate, p), values.min())])
     gains = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in values], base, whitened)
-    if gains is None:
-        return None
     best = int(np.argmax(gains))
     # between its neighbours the gain has one peak, and a large effect off its peak leaves a residual like noise
     near = np.geomspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], _FINER)
     finer = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in near], base, whitened)
-    value = near[int(np.argmax(finer))] if finer is not None and finer.max() > gains[best] else values[best]
+    value = near[int(np.argmax(finer))] if finer.max() > gains[best] else values[best]
     return {**shape_default(candidate), p.name: float(value)}
 
 
@@ -48,9 +46,8 @@ def longest(bench: Bench, candidate: CandidateCause, p: Parameter) -> float:
 def _gains(
     bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], base: Folds,
     whitened: White,
-) -> Floats | None:  # fmt: skip
-    """Chi-square (v,) that an effect explains with each of v shapes under the prior of its size; None where it is not
-    scanned.
+) -> Floats:  # fmt: skip
+    """Chi-square (v,) that an effect of the drive alone explains with each of v shapes under the prior of its size.
 
     The prior decides where rows do not determine a shape: the first part of every warm-up is straight.
     """
@@ -58,10 +55,7 @@ def _gains(
     count = max(AT_ONCE // (own * sum(map(len, base.residual))), 1)  # all together are as large as all other columns
     for i in range(0, len(shapes), count):
         some = shapes[i : i + count]
-        columns = quick_columns(bench, candidate, some)
-        if columns is None:
-            return None
-        white = [whitened(k, each) for k, each in enumerate(columns)]
+        white = [whitened(k, each) for k, each in enumerate(quick_columns(bench, candidate, some))]
         G, h = base.alone(white, own)
         G = G + np.eye(own) / PRIOR_WIDTHS[-1] ** 2
         gains.append(np.einsum("vp,vp->v", h, np.linalg.solve(G, h[:, :, None])[:, :, 0]))
@@ -79,15 +73,15 @@ def settled_interval(
     """
     paths = [run.run_path for run in bench.runs]
     every = _gains(bench, candidate, shapes, base, whitened)
-    best, (start, end) = dict(shapes[0 if every is None else int(every.argmax())]), [p.name for p in candidate.shapes]
+    best, (start, end) = dict(shapes[int(every.argmax())]), [p.name for p in candidate.shapes]
     run = next((p for p in paths if p.started <= 0.5 * (best[start] + best[end]) <= p.started + p.time[-1]), paths[0])
     row, step, most = float(np.median(np.diff(run.time))), 4, -np.inf
     while step:
         near = [best, *({**best, which: best[which] + sign * step * row} for which in (start, end) for sign in (-1, 1))]
         near = [each for each in near if each[end] - each[start] > 2 * row]
-        gains = _gains(bench, candidate, near, base, whitened) if near else None
-        if gains is None:
+        if not near:
             return best
+        gains = _gains(bench, candidate, near, base, whitened)
         if gains.max() > most and gains.argmax() > 0:
             most, best = float(gains.max()), near[int(gains.argmax())]
         else:
@@ -101,15 +95,11 @@ def reach(p: Parameter, value: float) -> float:
     return float(np.clip(0.5 * np.sort(gaps[gaps > 1e-9])[:2].max(initial=0.0), 0.005, 0.4))
 
 
-def quick_columns(
-    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]]
-) -> list[ByChannel] | None:
-    """Columns of an effect of the drive alone, straight from its hooks; None for any other effect.
+def quick_columns(bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]]) -> list[ByChannel]:
+    """Columns of an effect of the drive alone, straight from its hooks.
 
     Per run over its channels of n' rows each, thinned: those of every shape behind those of the one before.
     """
-    if signal_path.stages_of(candidate.effect) != {"drive"}:
-        return None
     causes = [cause_of(candidate, {**shape, p.name: p.scale}) for shape in shapes for p in candidate.parameters]
     m, every = len(bench.actuators), np.arange(len(causes))
     aimed, out = np.flatnonzero(causes[0].which(bench.actuators)), []

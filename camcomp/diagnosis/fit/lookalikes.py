@@ -56,10 +56,8 @@ def without_twins(bench: Bench, candidates: Sequence[CandidateCause]) -> list[Ca
     """
     out = []
     for each in candidates:
-        columns = None
-        if len(each.parameters) > 1 and any(p.placed for p in each.shapes):
+        if each.of_drive_alone and len(each.parameters) > 1 and any(p.placed for p in each.shapes):
             columns = quick_columns(bench, each, [never_ending(each)])
-        if columns is not None:
             seen = [np.isfinite(bench.residual(k)) for k in range(len(bench.runs))]
             flat = np.concatenate([c.dense()[s] for c, s in zip(columns, seen, strict=True)]).T
             twins = [

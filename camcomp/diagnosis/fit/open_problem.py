@@ -139,17 +139,17 @@ def _scanned(problem: Problem) -> Problem:
     changed: list[tuple[list[int], list[list[Floats]]]] = []
     for i in scanned:
         candidate = problem.columns.candidates[i]
+        if not candidate.of_drive_alone:
+            continue
         if problem.passing(i):
             always = quick_columns(problem.bench, candidate, [never_ending(candidate)])
-            if always is None:
-                continue
             white = [problem.white_columns(k, each) for k, each in enumerate(always)]
             near = likely_intervals(problem.bench, candidate, white, rest, problem.row_places)
-            best = settled_interval(problem.bench, candidate, near, base, problem.white_columns) if near else None
+            if not near:
+                continue
+            best = settled_interval(problem.bench, candidate, near, base, problem.white_columns)
         else:
             best = best_shape(problem.bench, candidate, base, problem.white_columns)
-        if best is None:
-            continue
         problem.shapes[i] = best
         columns = candidate_columns(problem.bench, candidate, best)
         changed.append((list(problem.candidates.columns[i]), columns))

@@ -149,7 +149,7 @@ class Problem:
         """
         candidate = self.columns.candidates[i]
         laws: list[tuple[Parameter, Sequence[float]]] = [(p, p.either) for p in candidate.switches]
-        if i in self._followed or stages_of(candidate.effect) == {"drive"} or hasattr(candidate.effect, "first_guess"):
+        if i in self._followed or candidate.of_drive_alone or hasattr(candidate.effect, "first_guess"):
             return laws
         return [*laws, *((p, p.scan) for p in candidate.shapes)]
 

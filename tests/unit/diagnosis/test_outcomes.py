@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.next_experiment.designed import NEITHER, outcomes_of
 from camcomp.diagnosis.next_experiment.information_gain import ExpectedGain
 from camcomp.diagnosis.next_experiment.predicted_logs import ONLY_NOISE
-from camcomp.diagnosis.next_experiment.proposal import NEITHER, outcomes_of
 
 
 def outcomes(names, apart, left, *, knows=()):
