@@ -20,12 +20,11 @@ from camcomp.compensation.long.kernel import (
     BIAS,
     EXACT,
     LEVELS,
-    MISSING,
     MOST_DEGREE,
     SPLIT,
     exponents,
+    find_tiles,
     look_up,
-    missing_cells,
     put_cells,
 )
 from camcomp.compensation.long.tile_files import TileFiles
@@ -155,7 +154,7 @@ class Field:
     """A machine's correction, loaded tip, tilt, drives and joints by interpolation. Machine frame."""
 
     def __init__(self, machine: Machine, force: Floats, middle: Floats = _ZERO, files: TileFiles | None = None) -> None:
-        """Force (n, 3) N: forces that will occur, or some of them. Machines of up to three actuators.
+        """Force (n, 3) N: forces that will occur, or some of them. Machines of three actuators.
 
         middle (3,) mm: centre of a cube; programs lie round their origin, and so in the fewest cubes. files: those that
         keep the tiles for later programs.
@@ -217,41 +216,47 @@ class Field:
             self._set_range(np.concatenate((force, [self.low, self.high])))
 
     def look(self, target: Floats, force: Floats | None, *, every: bool = True) -> tuple[Floats, Floats, Ints]:
-        """Answers (n, .) as in look_up for targets (n, 3) under forces (n, 3); nominal joints; tiles (n,), negative: none.
+        """Answers (n, .) as in look_up for targets (n, 3) under forces (n, 3); nominal joints; tiles (n,), negative: none, answers 0.
 
         Without forces the joints only. Makes the tiles that are not there yet.
         """
         n, m = len(target), len(self.machine.actuators)
         outputs = 0 if force is None else 9 + 2 * m if every else BASIC
-        answer, nominal = np.empty((n, outputs)), np.empty((n if every else 0, m))
+        answer, nominal = np.empty((n, outputs)), np.empty((n, m))
         force = np.zeros((n, 3)) if force is None else force
         self.widen(force)
-        near, tile = shifted(target, -self.corner), np.empty(n, np.int64)
-
-        def work(rows: slice) -> None:
-            look_up(rows.start, rows.stop, m, every, near, force, answer, nominal, tile, *packed)
-
-        for _ in range(LEVELS + 1):
-            packed = self.packed()
-            in_pieces(work, n, SLICE)
-            missing = np.flatnonzero(tile == MISSING)
-            if not len(missing):
-                break
-            t, cells = self.tiles, np.empty(len(missing), np.int64)
-            self._build(np.unique(cells[: missing_cells(t.keys, t.values, t.size, near[missing], cells)]))
+        near = shifted(target, -self.corner)
+        tile = self._tiles_of(near)
         self.mark(tile)
+        rows, packed = np.argsort(tile, kind="stable"), self.packed()
+        lost, rows = np.split(rows, [np.searchsorted(tile, 0, sorter=rows)])
+        answer[lost] = nominal[lost] = 0.0
+
+        def work(some: slice) -> None:
+            look_up(rows[some], every, near, force, answer, nominal, tile, *packed)
+
+        in_pieces(work, len(rows), SLICE)
         return answer, nominal, tile
 
+    def _tiles_of(self, points: Floats) -> Ints:
+        """Tiles (n,) of points (n, 3) from the corner, made where they are not there yet; negative: there is none."""
+        tile, cells = np.empty((2, len(points)), np.int64)
+        while True:
+            t = self.tiles
+            missing = find_tiles(t.keys, t.values, t.size, t.centre, t.half, points, tile, cells)
+            if not missing:
+                return tile
+            self._build(np.unique(cells[:missing]))
+
     def packed(self) -> tuple[Any, ...]:
-        """Arguments of the compiled look-up: cells, tiles, bases. The terms of a basis are the first ones of the largest."""
+        """Arguments of the compiled look-up: tiles, bases. The terms of a basis are the first ones of the largest."""
         t, most = self.tiles, self.bases[-1]
         shape = np.array([(*each.degree, len(each.position), len(each.force)) for each in self.bases])
         count = np.zeros((len(self.bases), len(most.force)), np.int64)
         for rung, each in enumerate(self.bases):
             count[rung, : len(each.count)] = each.count
         return (
-            t.size, t.keys, t.values, t.centre, t.half, t.rung, t.first, t.W, self.force_mid, self.force_half,
-            shape, count,
+            t.centre, t.half, t.rung, t.first, t.W, self.force_mid, self.force_half, shape, count,
         )  # fmt: skip
 
     def _build(self, cells: Ints) -> None:

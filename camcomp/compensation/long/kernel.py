@@ -24,7 +24,7 @@ MISSING, SPLIT, EXACT = -3, -1, -2  # what a cell can be besides a tile
 LEVELS = 6
 BIAS = 1 << 17  # cells are counted from here; 2**18 of them per axis
 AHEAD = 4  # rows within which an equal point is looked for
-LANES = 4  # points that are looked up together
+LANES = 64  # points of a tile that are looked up together
 MOST_DEGREE = 8  # highest degree that the evaluation has room for
 BASIC = 6  # outputs that are always asked for: correction (3), shift (3); then tilt (3), drives (m), change of the joints (m)
 
@@ -93,149 +93,142 @@ def find_tile(keys, values, size, x, y, z):
 
 
 @entry
-def missing_cells(keys, values, size, points, out):
-    """Keys of cells that points (n, 3) need and that are not there, with repetitions only in part; the number of them."""
+def find_tiles(keys, values, size, centre, half, points, tile, cells):
+    """Fills tile (n,) with the tiles of points (n, 3), EXACT or MISSING where there is none.
+
+    Returns how many keys of missing cells it put into cells (n,), with repetitions only in part.
+    """
     n = 0
-    last = -1
+    last = key = -1
+    here = EXACT
     for i in range(points.shape[0]):
-        tile, key = find_tile(keys, values, size, points[i, 0], points[i, 1], points[i, 2])
-        if tile == MISSING and key != last:
-            out[n] = key
-            last = key
+        p = part(points[i], 0)
+        if here < 0 or not distance(p, part(centre[here], 0)) < half[here]:
+            here, key = find_tile(keys, values, size, p[0], p[1], p[2])
+        tile[i] = here
+        if here == MISSING and key != last:
+            cells[n] = last = key
             n += 1
     return n
 
 
+@inner
+def distance(p, q):
+    """Largest component of the way between two points."""
+    return max(abs(p[0] - q[0]), abs(p[1] - q[1]), abs(p[2] - q[2]))
+
+
 @fast
-def terms(degree, U, at, T, out):
-    """Fills out (LANES, t) with the products of Chebyshev polynomials of three rows of U (6, LANES) from `at` on, up to a
-    total degree, lower degrees first.
+def terms(degree, U, lanes, T, out):
+    """Fills out (t, LANES) with the products of Chebyshev polynomials of the rows of U (3, LANES) up to a total degree, lower
+    degrees first, for the first lanes.
 
     T (MOST_DEGREE + 4, MOST_DEGREE + 1, LANES) is room to work in: polynomials of the rows, and behind them products of the first two.
     """
-    for lane in range(LANES):
-        for k in range(3):
-            T[k, 0, lane] = 1.0
-            T[k, 1, lane] = U[at + k, lane]
+    for k in range(3):
+        one, same = T[k, 0], T[k, 1]
+        for lane in range(lanes):
+            one[lane], same[lane] = 1.0, U[k, lane]
     for d in range(2, degree + 1):
         for k in range(3):
-            for lane in range(LANES):
-                T[k, d, lane] = 2.0 * U[at + k, lane] * T[k, d - 1, lane] - T[k, d - 2, lane]
+            same, before, last, new = T[k, 1], T[k, d - 2], T[k, d - 1], T[k, d]
+            for lane in range(lanes):
+                new[lane] = 2.0 * same[lane] * last[lane] - before[lane]
     n = 0
     for total in range(degree + 1):
         for i in range(total + 1):
-            for lane in range(LANES):
-                T[3 + total, i, lane] = T[0, i, lane] * T[1, total - i, lane]
+            first, second, both = T[0, i], T[1, total - i], T[3 + total, i]
+            for lane in range(lanes):
+                both[lane] = first[lane] * second[lane]
         for k in range(total + 1):
             for i in range(total - k + 1):
-                for lane in range(LANES):
-                    out[lane, n] = T[2, k, lane] * T[3 + total - k, i, lane]
+                third, both, row = T[2, k], T[3 + total - k, i], out[n]
+                for lane in range(lanes):
+                    row[lane] = third[lane] * both[lane]
                 n += 1
 
 
 @fast
-def products(A, B, count, out, lane):
-    """Fills out[lane] with the products of force terms B[lane] and position terms A[lane] that belong together; their number."""
-    n = 0
-    for b in range(count.shape[0]):
-        force = B[lane, b]
-        row = out[lane, n : n + count[b]]
-        for a in range(row.shape[0]):
-            row[a] = force * A[lane, a]
-        n += count[b]
-    return n
+def contract(W, first, A, B, count, outputs, lanes, S, out):
+    """Fills out (outputs, LANES) with sums over force terms B (nf, LANES), each times a sum over the first count (nf,) of the
+    position terms A (np, LANES); coefficients from `first` on, output by output. S (3, LANES): room to work in.
 
-
-@fast
-def contract(W, first, C, n, outputs, out):
-    """Fills out (LANES, outputs) with the sums over n terms C (LANES, n or more); coefficients from `first` on, output by output.
-
-    Four points and three outputs at once: every number fetched serves several products, which then set the pace.
+    Two terms and three outputs at once: every number fetched serves several products, which then set the pace.
     """
-    c0, c1, c2, c3 = C[0, :n], C[1, :n], C[2, :n], C[3, :n]  # with indices from 0 on, the loop runs in vectors
+    n = count.sum()
+    t0, t1, t2 = S[0], S[1], S[2]
     for o in range(0, outputs, 3):
-        o1, o2 = min(o + 1, outputs - 1), min(o + 2, outputs - 1)
-        u = W[first + o * n : first + (o + 1) * n]
-        v = W[first + o1 * n : first + (o1 + 1) * n]
-        w = W[first + o2 * n : first + (o2 + 1) * n]
-        u0 = u1 = u2 = u3 = v0 = v1 = v2 = v3 = w0 = w1 = w2 = w3 = 0.0
-        for j in range(n):
-            u0 += c0[j] * u[j]
-            u1 += c1[j] * u[j]
-            u2 += c2[j] * u[j]
-            u3 += c3[j] * u[j]
-            v0 += c0[j] * v[j]
-            v1 += c1[j] * v[j]
-            v2 += c2[j] * v[j]
-            v3 += c3[j] * v[j]
-            w0 += c0[j] * w[j]
-            w1 += c1[j] * w[j]
-            w2 += c2[j] * w[j]
-            w3 += c3[j] * w[j]
-        out[0, o], out[1, o], out[2, o], out[3, o] = u0, u1, u2, u3
-        out[0, o1], out[1, o1], out[2, o1], out[3, o1] = v0, v1, v2, v3
-        out[0, o2], out[1, o2], out[2, o2], out[3, o2] = w0, w1, w2, w3
+        s0, s1, s2 = out[o], out[o + 1], out[o + 2]
+        u, v, w = W[first + o * n :], W[first + (o + 1) * n :], W[first + (o + 2) * n :]
+        for lane in range(lanes):
+            s0[lane] = s1[lane] = s2[lane] = 0.0
+        at = 0
+        for b in range(count.shape[0]):
+            for lane in range(lanes):
+                t0[lane] = t1[lane] = t2[lane] = 0.0
+            for a in range(0, count[b], 2):
+                pair = a + 1 < count[b]
+                i, j = at + a, at + a + pair
+                u0, v0, w0 = u[i], v[i], w[i]
+                u1, v1, w1 = (u[j], v[j], w[j]) if pair else (0.0, 0.0, 0.0)
+                a0, a1 = A[a], A[a + pair]
+                for lane in range(lanes):
+                    t0[lane] += u0 * a0[lane] + u1 * a1[lane]
+                    t1[lane] += v0 * a0[lane] + v1 * a1[lane]
+                    t2[lane] += w0 * a0[lane] + w1 * a1[lane]
+            force = B[b]
+            for lane in range(lanes):
+                s0[lane] += force[lane] * t0[lane]
+                s1[lane] += force[lane] * t1[lane]
+                s2[lane] += force[lane] * t2[lane]
+            at += count[b]
 
 
 def look_up(
-    a: int, b: int, m: int, every: bool, target: Floats, force: Floats, answer: Floats, nominal: Floats, tile_of: Ints, *packed: Any
-) -> None:  # fmt: skip
-    """Answers (n, 9 + 2 m) at targets (n, 3) under forces (n, 3) for rows a to b; tile_of (n,), negative: there is none.
+    rows: Ints, every: bool, target: Floats, force: Floats, answer: Floats, nominal: Floats, tile_of: Ints, *packed: Any
+) -> None:
+    """Answers (n, 9 + 2 m) at targets (n, 3) under forces (n, 3) in tiles tile_of (n,), for rows (k,) of them, sorted by tile.
 
     every: all outputs and nominal joints (n, m), or with an answer (n, 0) the joints only; otherwise correction and shift only.
     packed: those of a Field.
     """
     *_, shape, count = packed
-    outputs, along, across = max(answer.shape[1], m), shape[:, 2].max(), count.shape[1]
+    outputs, along, across = max(answer.shape[1], nominal.shape[1]), shape[:, 2].max(), count.shape[1]
     room = (
-        np.empty((MOST_DEGREE + 4, MOST_DEGREE + 1, LANES)),
-        np.zeros((6, LANES)),
-        *(np.zeros((LANES, n)) for n in (along, across, along * across, outputs)),
-    )
-    look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, *packed, *room)
+        np.empty((MOST_DEGREE + 4, MOST_DEGREE + 1, LANES)), *(np.empty((n, LANES)) for n in (6, along, across, 3, outputs)),
+    )  # fmt: skip
+    look_up_rows(rows, every, target, force, answer, nominal, tile_of, *packed, *room)
 
 
 @entry
-def look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, size, keys, values, centre, half, rung, first, W, mid, wide,
-                 shape, count, T, U, A, B, C, out):  # fmt: skip
-    """look_up with room to work in, T and U as in `terms`, the others (LANES, most terms or outputs), finite."""
-    outputs = answer.shape[1]
-    i = a
-    while i < b:
-        tile, _ = find_tile(keys, values, size, target[i, 0], target[i, 1], target[i, 2])
-        tile_of[i] = tile
-        if tile < 0:
-            i += 1
-            continue
-        r, h, c = rung[tile], half[tile], centre[tile]
-        along, across, inner, outer = shape[r]
-        lanes = n = 0
-        while lanes < LANES and i + lanes < b:  # the points behind it that lie in the same tile
-            f = force[i + lanes]
-            x, y, z = target[i + lanes, 0] - c[0], target[i + lanes, 1] - c[1], target[i + lanes, 2] - c[2]
-            if lanes > 0 and not max(abs(x), abs(y), abs(z)) < h:
-                break
-            U[0, lanes], U[1, lanes], U[2, lanes] = x / h, y / h, z / h
+def look_up_rows(rows, every, target, force, answer, nominal, tile_of, centre, half, rung, first, W, mid, wide, shape, count,
+                 T, U, A, B, S, out):  # fmt: skip
+    """look_up with room to work in, T and S as in `terms` and `contract`, the others (most terms or outputs, LANES)."""
+    outputs, m = answer.shape[1], nominal.shape[1]
+    begin = 0
+    while begin < rows.shape[0]:
+        tile = tile_of[rows[begin]]
+        lanes = 0
+        while lanes < LANES and begin + lanes < rows.shape[0] and tile_of[rows[begin + lanes]] == tile:
+            i = rows[begin + lanes]
             for k in range(3):
-                U[3 + k, lanes] = (f[k] - mid[k]) / wide[k]
+                U[k, lanes] = (target[i, k] - centre[tile, k]) / half[tile]
+                U[3 + k, lanes] = (force[i, k] - mid[k]) / wide[k]
             lanes += 1
-        terms(along, U, 0, T, A)
-        n = count[r, :outer].sum()
-        if outputs > 0:
-            terms(across, U, 3, T, B)
-            for lane in range(lanes):
-                products(A, B, count[r, :outer], C, lane)
-            contract(W, first[tile], C, n, outputs, out)
+        along, across, _, outer = shape[rung[tile]]
+        of_both, of_one = count[rung[tile], :outer], shape[rung[tile], 2:3]
+        terms(along, U[:3], lanes, T, A)
+        terms(across, U[3:], lanes, T, B)
+        contract(W, first[tile], A, B, of_both, outputs, lanes, S, out)
         for lane in range(lanes):
-            tile_of[i + lane] = tile
             for k in range(outputs):
-                answer[i + lane, k] = out[lane, k]
+                answer[rows[begin + lane], k] = out[k, lane]
         if every:
-            contract(W, first[tile] + (9 + 2 * m) * n, A, inner, m, out)
+            contract(W, first[tile] + (9 + 2 * m) * of_both.sum(), A, B, of_one, m, lanes, S, out)
             for lane in range(lanes):
                 for k in range(m):
-                    nominal[i + lane, k] = out[lane, k]
-        i += lanes
+                    nominal[rows[begin + lane], k] = out[k, lane]
+        begin += lanes
 
 
 @entry

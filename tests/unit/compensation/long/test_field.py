@@ -5,7 +5,7 @@ import pytest
 
 from camcomp.compensation.long import field as field_module
 from camcomp.compensation.long.field import ALLOWED, LEVELS, Field
-from camcomp.compensation.long.kernel import look_up
+from camcomp.compensation.long.kernel import find_tiles, look_up
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.job import Job
@@ -51,7 +51,7 @@ def test_every_answer_is_the_exact_one_within_the_promise(orthoglide):
 
 
 def test_neighbours_asked_together_get_what_each_gets_alone(orthoglide):
-    """Several points of a tile share one pass through its coefficients; where a tile ends, fewer do."""
+    """Points of a tile share one pass through its coefficients, as many as there are lanes; the last ones are fewer."""
     rng, way = np.random.default_rng(4), np.linspace(0.0, 1.0, 97)[:, None]
     target = np.array([-60.0, -70.0, -170.0]) + way * np.array([40.0, 30.0, 5.0])
     force = rng.uniform(FORCE.min(axis=0), FORCE.max(axis=0), (97, 3))
@@ -92,8 +92,10 @@ def test_a_wider_range_of_forces_makes_a_new_field():
 def test_where_no_fit_is_good_enough_points_are_left_to_the_solver(monkeypatch):
     monkeypatch.setattr(field_module, "ALLOWED", -1.0)
     known = Field(machine("cartesian"), np.zeros((1, 3)))
-    _, _, tile = ask(known, np.zeros((2, 3)), np.zeros((2, 3)))
+    monkeypatch.setattr(np, "empty", lambda shape, dtype=float: np.full(shape, 7, dtype))  # of a process before
+    answer, nominal, tile = known.look(np.zeros((2, 3)), np.zeros((2, 3)))
     assert (tile < 0).all() and len(known.tiles.half) == 0
+    assert not answer.any() and not nominal.any(), "or the next points would lie anywhere"
 
 
 def test_a_cube_with_points_out_of_reach_is_divided(orthoglide):
@@ -112,15 +114,15 @@ def test_a_cube_with_points_out_of_reach_is_divided(orthoglide):
     assert (known.tiles.values == -1).any()
 
 
-def test_points_in_known_cubes_are_looked_up_once_and_not_looked_for_before(orthoglide, monkeypatch):
+def test_points_are_searched_once_and_looked_up_once_where_their_cubes_are_known(orthoglide, monkeypatch):
     target, force = points(np.random.default_rng(5), 50, np.array([-4.0, -4.0, -104.0]), np.array([4.0, 4.0, -96.0]))
     known = Field(orthoglide, FORCE)
     ask(known, target, force)
     asked = []
-    monkeypatch.setattr(field_module, "look_up", lambda *args: asked.append(look_up(*args)))
-    monkeypatch.setattr(field_module, "missing_cells", None)
+    for each in (find_tiles, look_up):
+        monkeypatch.setattr(field_module, each.__name__, lambda *args, own=each: asked.append(own) or own(*args))
     ask(known, target, force)
-    assert len(asked) == 1
+    assert asked == [find_tiles, look_up]
 
 
 def test_far_out_of_reach_one_point_of_a_cube_is_tried_and_no_more(orthoglide):
