@@ -25,6 +25,7 @@ LEVELS = 6
 BIAS = 1 << 17  # cells are counted from here; 2**18 of them per axis
 AHEAD = 4  # rows within which an equal point is looked for
 LANES = 64  # points of a tile that are looked up together
+CACHE_LINE = 8  # numbers
 MOST_DEGREE = 8  # highest degree that the evaluation has room for
 BASIC = 6  # outputs that are always asked for: correction (3), shift (3); then tilt (3), drives (m), change of the joints (m)
 
@@ -194,10 +195,16 @@ def look_up(
     """
     *_, shape, count = packed
     outputs, along, across = max(answer.shape[1], nominal.shape[1]), shape[:, 2].max(), count.shape[1]
-    room = (
-        np.empty((MOST_DEGREE + 4, MOST_DEGREE + 1, LANES)), *(np.empty((n, LANES)) for n in (6, along, across, 3, outputs)),
-    )  # fmt: skip
+    room = _lanes(MOST_DEGREE + 4, MOST_DEGREE + 1), *map(_lanes, (6, along, across, 3, outputs))
     look_up_rows(rows, every, target, force, answer, nominal, tile_of, *packed, *room)
+
+
+def _lanes(*rows: int) -> Floats:
+    """Room (*rows, LANES) that begins with a line of the cache: vectors across two of them take half as long again."""
+    count = LANES * math.prod(rows)
+    out = np.empty(count + CACHE_LINE)
+    begin = -(out.ctypes.data // out.itemsize) % CACHE_LINE
+    return out[begin : begin + count].reshape(*rows, LANES)
 
 
 @entry
