@@ -35,7 +35,7 @@ def causes_without(
     out = []
     for k in runs:
         f, members = max(tried, key=lambda each: value(k, *each))
-        out.append(_by_candidate(problem, f, members, problem.theta_without(f, k, members)))
+        out.append(_by_candidate(problem, f, members, problem.determined_without(f, k, members)[0]))
     return out
 
 

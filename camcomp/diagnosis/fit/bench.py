@@ -216,9 +216,9 @@ class Bench:
             out[self._out[k]] = np.nan
         return out
 
-    def residual(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
-        """Measured minus model (n, c) in run k, thinned."""
-        return self.difference(k, self.read(k, causes) if causes else self.nominal[k])
+    def residual(self, k: int) -> Floats:
+        """Measured minus nominal model (n, c) in run k, thinned."""
+        return self.difference(k, self.nominal[k])
 
     def difference(self, k: int, reading: Reading) -> Floats:
         """Measured minus a reading (n, c) of run k, thinned."""

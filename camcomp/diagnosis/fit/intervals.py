@@ -29,7 +29,7 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
     # a shape that the data do not tell is known to about a third
     reach = np.array([0.3 * f.extra[i][p.name] for i, p in names])
     G = [W.appended(D * reach) for W, D in zip(problem.white_at(f), shapes, strict=True)]
-    usual, most = _stated(problem, problem.prior.precision, problem.prior.reach.copy())
+    usual, most = _stated(problem)
     precision = np.concatenate([usual, np.ones(s)])
     precision[index] = FREE
     M = sum((g.T @ g for g in G), np.diag(precision))
@@ -62,9 +62,9 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
     return np.asarray(out + np.diag(healthy**2 + formula**2), float)
 
 
-def _stated(problem: Problem, usual: Floats, most: Floats) -> tuple[Floats, Floats]:
+def _stated(problem: Problem) -> tuple[Floats, Floats]:
     """Precision and reach (k,) of all columns, with springs and forces known to STATED of themselves only."""
-    precision, reach = usual.copy(), most.copy()
+    precision, reach = problem.prior.precision, problem.prior.reach.copy()
     for candidate, columns in zip(problem.columns.candidates, problem.candidates.columns, strict=True):
         for p, c in zip(candidate.parameters, columns, strict=True):
             if p.log:

@@ -239,12 +239,10 @@ class Problem:
             self._last = key, [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
         return self._last[1]
 
-    def theta_without(self, f: Fitted, k: int, members: Members | None = None) -> Floats:
-        """The coordinates of the members, or of some of them by themselves, fitted without run k, about the fit to all runs."""
-        return self.determined_without(f, k, members)[0]
-
     def determined_without(self, f: Fitted, k: int, members: Members | None = None) -> tuple[Floats, Floats]:
-        """The same, and their standard deviations."""
+        """The coordinates of the members, or of some of them by themselves, fitted without run k, about the fit to all runs, and their
+        standard deviations.
+        """
         members = f.members if members is None else members
         index, at = self.member_columns(members), self.member_columns(f.members)
         if len(f.grams) == 1 or not members:
@@ -317,30 +315,13 @@ class Problem:
                     step = -step
                 changed = theta.copy()
                 changed[at + j] += step / p.scale
-                acts = self._runs_of(i, shapes)
-                out.append(self._slope(self.causes(members, changed, shapes), readings, step / p.scale, acts))
+                out.append(self._slope(self.causes(members, changed, shapes), readings, step / p.scale))
             at += len(candidate.parameters)
         return out
 
-    def _slope(
-        self, causes: Sequence[Cause], readings: Sequence[Reading], step: float, acts: Sequence[bool] | None = None
-    ) -> list[Floats]:
-        """Change of the channels per unit, per run (n, c), from readings to those with other causes; acts: runs that change."""
-        out = []
-        for k, reading in enumerate(readings):
-            if acts is not None and not acts[k]:
-                out.append(np.zeros_like(self.residuals[k]))
-                continue
-            out.append(self.bench.change(k, self.bench.read(k, causes), reading) / step)
-        return out
-
-    def _runs_of(self, i: int, shapes: Mapping[int, Mapping[str, float]]) -> list[bool]:
-        """Runs in which a candidate acts: effects that begin and end are zero in the others."""
-        if not self.passing(i):
-            return [True] * len(self.bench.runs)
-        start, end = (shapes[i][p.name] for p in self.columns.candidates[i].shapes)
-        paths = [run.run_path for run in self.bench.runs]
-        return [path.started + path.grid[0] <= end and start <= path.started + path.grid[-1] for path in paths]
+    def _slope(self, causes: Sequence[Cause], readings: Sequence[Reading], step: float) -> list[Floats]:
+        """Change of the channels per unit, per run (n, c), from readings to those with other causes."""
+        return [self.bench.change(k, self.bench.read(k, causes), each) / step for k, each in enumerate(readings)]
 
     def shape_columns(self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]) -> list[Floats]:
         """White columns (w, s) per run of the members' shapes, in their own units."""

@@ -114,7 +114,7 @@ def _gaps(problem: Problem, f: Fitted | None) -> list[Floats]:
     """Gaps (n, 3) mm of the tip per run that the causes, fitted without it, leave."""
     if f is None:
         return [problem.bench.gap(k)[:, :3] for k in range(len(problem.bench.runs))]
-    return [_gap(problem, f, k, problem.theta_without(f, k)) for k in range(len(problem.bench.runs))]
+    return [_gap(problem, f, k, problem.determined_without(f, k)[0]) for k in range(len(problem.bench.runs))]
 
 
 def _gap(problem: Problem, f: Fitted, k: int, theta: Floats) -> Floats:

@@ -102,7 +102,7 @@ def coarse(site: Site) -> Iterator[Candidate]:
             yield _air(site, base, radius=radius, plane=plane)
     diagonals = np.array([[0.5**0.5, 0.5**0.5, 0.0], [0.5**0.5, -(0.5**0.5), 0.0]])
     for line in np.concatenate([np.eye(3), diagonals]):
-        ends = OUT[-1] * site.room.reaches(middle, np.array([line, -line]), site.farther, site.low)
+        ends = OUT[-1] * site.reaches(middle, np.array([line, -line]))
         if (half := 0.5 * float(ends.sum())) > 0.0:
             centre = middle + 0.5 * float(ends[0] - ends[1]) * line
             yield _air(site, base, centre=_triple(centre), radius=half, along=_triple(line))
@@ -151,7 +151,7 @@ def _reaches(site: Site, base: MotionDesign) -> tuple[Floats, Floats, Floats]:
     every = np.array([w for w in product((1.0, 0.0, -1.0), repeat=3) if sum(map(abs, w)) in (1.0, 3.0)])
     ways = every / np.linalg.norm(every, axis=1)[:, None]
     middle = np.array(_in_air(site, replace(base, cutting=False)).centre)
-    return middle, ways, site.room.reaches(middle, ways, site.farther, site.low)
+    return middle, ways, site.reaches(middle, ways)
 
 
 def _air(site: Site, base: MotionDesign, varies: tuple[str, ...] = (), **changes: Any) -> Candidate:

@@ -38,10 +38,11 @@ class WorkPlace:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Site:
-    """Regions and channels of the runs.
+    """Regions and channels of the runs, and what the machine reaches.
 
     work: of all runs; cut: of cutting, or None. low: height above which there are no obstacles, mm; end: of the last run, s on
-    the common clock; channels: logged ones; room: what the machine reaches.
+    the common clock; channels: logged ones; limits: (m, 2) of the actuators; stretch: largest motion of the tip per motion of the
+    drives.
     """
 
     work: WorkPlace
@@ -49,7 +50,9 @@ class Site:
     low: float
     end: float
     channels: tuple[str, ...]
-    room: Room
+    twin: Twin
+    limits: Floats
+    stretch: float
 
     @property
     def farther(self) -> float:
@@ -59,20 +62,45 @@ class Site:
     def holds(self, points: Floats) -> bool:
         """Whether points (n, 3) of an experiment are within reach of the machine and within `farther` of the work."""
         near = np.abs(points - self.work.centre).max() <= self.farther + self.work.half.max()
-        return bool(near and self.room.allowed(points).all())
+        return bool(near and self._allowed(points).all())
+
+    def reaches(self, start: Floats, directions: Floats) -> Floats:
+        """Lengths (k,) mm, at most `farther`, of straight lines from `start` (3,) along unit directions (k, 3) within reach and above
+        `low`.
+        """
+        far = self.farther * np.arange(1, _STEPS + 1) / _STEPS
+        points = start + far[None, :, None] * directions[:, None, :]
+        good = self._allowed(points.reshape(-1, 3)).reshape(len(directions), _STEPS)
+        good &= points[:, :, 2] >= self.low - _DIFFERENCE_MM
+        return np.asarray(self.farther * np.cumprod(good, axis=1).sum(axis=1) / _STEPS, float)
+
+    def _allowed(self, points: Floats) -> Bools:
+        """Mask (n,) of points (n, 3), program frame, within travel and not nearer to singular poses than `stretch` says."""
+        try:
+            rho = self.twin.inverse(self.twin.to_machine(points))
+            near = _stretch(self.twin, points) <= self.stretch
+        except PhysicsError:  # of one of them
+            half = len(points) // 2
+            if half == 0:
+                return np.zeros(1, bool)
+            return np.concatenate([self._allowed(points[:half]), self._allowed(points[half:])])
+        inside = np.isfinite(rho) & (rho >= self.limits[:, 0]) & (rho <= self.limits[:, 1])
+        return np.asarray(inside.all(axis=1) & near)
 
 
 def site_of(bench: Bench, job: Job) -> Site:
     """The site of the runs of a bench on the machine of a job."""
     each = [run.commanded(bench.twin) for run in bench.runs]
     tips = np.concatenate(each)
+    some = tips[np.unique(np.linspace(0, len(tips) - 1, _POSES).astype(int))]
     loaded = [np.abs(run.run_path.row_force).sum(axis=1) > 0.0 for run in bench.runs]
     every = np.concatenate(loaded)
     feeds = [run.run_path.feed_mm_per_min for run in bench.runs]
     cutting = [f for f, load in zip(feeds, loaded, strict=True) if load.any()]
     return Site(
         work=_place(tips, feeds), cut=_place(tips[every], cutting) if every.any() else None,
-        low=_low(bench, each, loaded), room=Room(bench.twin, np.array(job.machine.limits, float), tips),
+        low=_low(bench, each, loaded), twin=bench.twin, limits=np.array(job.machine.limits, float),
+        stretch=STRETCH * float(_stretch(bench.twin, some).max()),
         end=max(run.run_path.started + float(run.run_path.time[-1]) for run in bench.runs),
         channels=tuple(c for c in KINDS if any(run.measured.has(c) for run in bench.runs)),
     )  # fmt: skip
@@ -106,40 +134,9 @@ def _crossings(run: Run) -> Floats:
     return np.asarray(np.minimum(path.start, path.end)[rapid, 2], float)
 
 
-class Room:
-    """Reachable region: within travel, with a tip motion per drive motion of at most STRETCH times that of the runs."""
-
-    def __init__(self, twin: Twin, limits: Floats, tips: Floats) -> None:
-        """limits: (m, 2) of the actuators; tips: (n, 3) of the runs, program frame."""
-        self.twin, self.limits = twin, limits
-        some = tips[np.unique(np.linspace(0, len(tips) - 1, _POSES).astype(int))]
-        self.most = STRETCH * float(np.max(self._stretch(some)))
-
-    def allowed(self, points: Floats) -> Bools:
-        """Mask (n,) of points (n, 3), program frame, within the region."""
-        try:
-            rho = self.twin.inverse(self.twin.to_machine(points))
-            near = self._stretch(points) <= self.most
-        except PhysicsError:  # of one of them
-            half = len(points) // 2
-            if half == 0:
-                return np.zeros(1, bool)
-            return np.concatenate([self.allowed(points[:half]), self.allowed(points[half:])])
-        inside = np.isfinite(rho) & (rho >= self.limits[:, 0]) & (rho <= self.limits[:, 1])
-        return np.asarray(inside.all(axis=1) & near)
-
-    def reaches(self, start: Floats, directions: Floats, most: float, low: float) -> Floats:
-        """Lengths (k,) mm of straight lines from `start` (3,) along unit directions (k, 3) within the region and above `low`."""
-        far = most * np.arange(1, _STEPS + 1) / _STEPS
-        points = start + far[None, :, None] * directions[:, None, :]
-        good = self.allowed(points.reshape(-1, 3)).reshape(len(directions), _STEPS) & (
-            points[:, :, 2] >= low - _DIFFERENCE_MM
-        )
-        return np.asarray(most * np.cumprod(good, axis=1).sum(axis=1) / _STEPS, float)
-
-    def _stretch(self, points: Floats) -> Floats:
-        """Largest motion (n,) of the tip per motion of the drives, by differences of the inverse kinematics."""
-        moved = np.concatenate([points + s * _DIFFERENCE_MM * axis for axis in np.eye(3) for s in (1.0, -1.0)])
-        rho = self.twin.inverse(self.twin.to_machine(moved)).reshape(3, 2, len(points), -1)
-        slopes = np.moveaxis((rho[:, 0] - rho[:, 1]) / (2.0 * _DIFFERENCE_MM), 0, 2)  # (n, m, 3)
-        return np.asarray(1.0 / np.maximum(np.linalg.svd(slopes, compute_uv=False)[:, -1], 1e-12), float)
+def _stretch(twin: Twin, points: Floats) -> Floats:
+    """Largest motion (n,) of the tip per motion of the drives at points (n, 3), by differences of the inverse kinematics."""
+    moved = np.concatenate([points + s * _DIFFERENCE_MM * axis for axis in np.eye(3) for s in (1.0, -1.0)])
+    rho = twin.inverse(twin.to_machine(moved)).reshape(3, 2, len(points), -1)
+    slopes = np.moveaxis((rho[:, 0] - rho[:, 1]) / (2.0 * _DIFFERENCE_MM), 0, 2)  # (n, m, 3)
+    return np.asarray(1.0 / np.maximum(np.linalg.svd(slopes, compute_uv=False)[:, -1], 1e-12), float)

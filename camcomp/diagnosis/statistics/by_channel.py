@@ -129,17 +129,11 @@ class _Turned:
             for on, X in mine.parts:
                 gram[np.ix_(on, on)] += X.T @ X
             return gram
-        if isinstance(other, ByChannel) and mine._starts == other._starts:
+        if isinstance(other, ByChannel):
             out = np.zeros((mine.width, other.width))
             for (on, X), (to, Y) in zip(mine.parts, other.parts, strict=True):
                 if len(on) and len(to):
                     out[np.ix_(on, to)] += X.T @ Y
-            return out
-        if isinstance(other, ByChannel):
-            out, at = np.zeros((mine.width, other.width)), 0
-            for on, X in other.parts:
-                out[:, on] += mine[at : at + len(X)].T @ X
-                at += len(X)
             return out
         out = np.zeros((mine.width, *other.shape[1:]))
         for (on, X), at in zip(mine.parts, mine._starts, strict=False):

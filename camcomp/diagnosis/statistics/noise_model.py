@@ -34,18 +34,18 @@ class Noise:
     memory: Floats
     _laid: dict[int, tuple[Floats, Floats, dict[int, _Channel]]] = field(default_factory=dict, init=False, repr=False)
 
-    def rows(self, run: int, values: Floats, inflate: Floats, time: Floats, first: int = 0) -> Floats:
-        """White rows (w, k) of values (n, c, k), channels from `first` on: channel by channel, missing rows left out.
+    def rows(self, run: int, values: Floats, inflate: Floats, time: Floats) -> Floats:
+        """White rows (w, k) of values (n, c, k): channel by channel, missing rows left out.
 
-        inflate (n, all channels) >= 1: by how much a row is less certain than its channel. time (n,) s.
+        inflate (n, c) >= 1: by how much a row is less certain than its channel. time (n,) s.
         """
         channels = ByChannel.of(values[:, j] for j in range(values.shape[1]))
-        return np.asarray(self.by_channel(run, channels, inflate, time, first)[:, np.arange(values.shape[2])])
+        return np.asarray(self.by_channel(run, channels, inflate, time)[:, np.arange(values.shape[2])])
 
-    def by_channel(self, run: int, values: ByChannel, inflate: Floats, time: Floats, first: int = 0) -> ByChannel:
+    def by_channel(self, run: int, values: ByChannel, inflate: Floats, time: Floats) -> ByChannel:
         """The same of values whose channels, n rows each, lie one behind the other."""
         known, parts = self._known(run, inflate, time), []
-        for j, (on, x) in enumerate(values.parts, first):
+        for j, (on, x) in enumerate(values.parts):
             if j in known:
                 each, white = known[j], np.empty((len(known[j].rows), len(on)))
                 _innovations(x, each.rows, each.scale, each.fresh, self.slow[run, j], self.memory[run, j], white)

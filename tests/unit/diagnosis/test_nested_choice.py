@@ -18,9 +18,9 @@ class Told(SimpleNamespace):
     def member_columns(self, members):
         return list(members)
 
-    def theta_without(self, f, k, members):
+    def determined_without(self, f, k, members):
         others = f.without(k)
-        return estimate(others, self.prior, list(members))[0][list(members)]
+        return estimate(others, self.prior, list(members))[0][list(members)], None
 
     def causes(self, members, theta, shapes):
         return list(zip(members, theta, strict=True))
