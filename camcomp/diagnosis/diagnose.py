@@ -16,7 +16,7 @@ from camcomp.diagnosis.answer.minor import MOST_LISTED, minor_effects
 from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
-from camcomp.diagnosis.fit.gap import floor_um, gap_sizes, rest_by_actuator
+from camcomp.diagnosis.fit.gap import floor_um, gap_sizes, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
 from camcomp.diagnosis.fit.open_problem import open_problem
@@ -299,7 +299,9 @@ def _where(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer | 
 
 
 def _stage(problem: Problem, best: Fitted, found: CauseSearch, law: LawAnswer | None) -> str:
-    """The stage of the largest cause; of an unknown one, that of its law, or else of the channel that shows it."""
+    """The stage of the largest cause; of an unknown one, that of its law, or else of the channel that shows it; without any, of the
+    channels in which the gap is stated.
+    """
     energy = _energies(problem, best)
     left = _unknown_energy(found)
     if found.unknown_in and left > max(energy, default=0.0):
@@ -312,13 +314,7 @@ def _stage(problem: Problem, best: Fitted, found: CauseSearch, law: LawAnswer | 
         return stage or ("structure" if labels and labels[0][0].startswith("force") else "drive")
     if energy:
         return str(problem.columns.candidates[best.members[int(np.argmax(energy))]].effect.STAGE)
-    parts = {"control": slice(3, 3 + len(problem.bench.actuators)), "structure": slice(0, 3)}
-    size = {}
-    for name, part in parts.items():
-        white = [np.nanmean((r[:, part] / problem.noise.sigma[k, part]) ** 2) for k, r in enumerate(problem.residuals)
-                 if np.isfinite(r[:, part]).any()]  # fmt: skip
-        size[name] = float(np.mean(white)) if white else 0.0
-    return max(size, key=lambda each: size[each])
+    return "structure" if main_channels(problem).start == 0 else "control"
 
 
 def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[Mapping[str, Any]]) -> list[Driver]:

@@ -115,7 +115,6 @@ class TermBench(TermRows):
     def __init__(self, bench: Bench, noise: Noise, inflate: Sequence[Floats], times: Sequence[Floats]) -> None:
         self.bench, self.noise, self.inflate, self.times = bench, noise, inflate, times
         self._rows: dict[tuple[str, int], list[Rows]] = {}
-        self._squares: dict[Spot, list[Floats]] = {}
         self._reaches: dict[tuple[Spot, int], tuple[list[int], Floats]] = {}
         self.actuators, self.row_counts = bench.actuators, [len(run.run_path.time) for run in bench.runs]
         gaps = np.concatenate([bench.gap(k)[:, :3].ravel() for k in range(len(bench.runs))])
@@ -146,9 +145,9 @@ class TermBench(TermRows):
 
     def rms(self, spot: Spot, values: Sequence[Floats]) -> Floats:
         """By how much each of functions (n, f) at a spot moves the tip (f,), per unit of its coefficient: over all rows."""
-        if spot not in self._squares:
-            self._squares[spot] = [np.sum(way**2, axis=1) for way in self.tip_ways(spot)]
-        energy = np.sum([way @ v**2 for way, v in zip(self._squares[spot], values, strict=True)], axis=0)
+        energy = np.sum(
+            [(way**2).sum(axis=1) @ v**2 for way, v in zip(self.tip_ways(spot), values, strict=True)], axis=0
+        )
         return np.asarray(np.sqrt(energy / sum(self.row_counts)))
 
     def moves(self, spot: Spot, values: Sequence[Floats]) -> list[Floats]:
