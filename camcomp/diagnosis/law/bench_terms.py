@@ -22,6 +22,8 @@ from camcomp.model.law.spline_map import splines, tensor
 from camcomp.model.statics.description import Robot
 
 Rows = TipRows | DriveRows
+AXES = "xyz"
+OF_ACTUATORS = ("control", "drive", "force")  # places of a law
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,10 @@ class TermRows(ABC):
     @abstractmethod
     def shown(self, spot: Spot) -> Sequence[Floats]:
         """Instants per run, on the common clock, of rows that show what happens at a spot."""
+
+    def where(self, spot: Spot) -> str:
+        """A spot in words."""
+        return f"{spot.on} {self.actuators[spot.index]}" if spot.on in OF_ACTUATORS else f"tip {AXES[spot.index]}"
 
     def sizes(self, spot: Spot) -> Sizes:
         """Reach of the covariates there."""

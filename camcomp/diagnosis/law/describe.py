@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from camcomp.diagnosis.law.bench_terms import Spot, TermBench, TermRows
+from camcomp.diagnosis.law.bench_terms import AXES, OF_ACTUATORS, Spot, TermBench, TermRows
 from camcomp.diagnosis.law.find import FoundLaw, strengths
 from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.words import law_sentence, law_sum, listed
@@ -17,16 +17,12 @@ from camcomp.diagnosis.result.types import Law, LawPart, LawTerm, Stage, six_dig
 from camcomp.ground.datatypes import Floats
 from camcomp.model.law.expression import parse
 
-_AXES = "xyz"
-OF_ACTUATORS = ("control", "drive", "force")  # places of a law
-
 
 def law_result(bench: TermRows, found: FoundLaw, before_um: float, after_um: float) -> Law:
     """The law as it stands in the result; before, after: rms of the gap on runs that it was not fitted to."""
-    actuators = bench.actuators
-    parts, terms = (_map_parts if found.is_map else _formula_parts)(bench, found, actuators)
+    parts, terms = (_map_parts if found.is_map else _formula_parts)(bench, found)
     forms = [t.form for t in found.terms]
-    alike = dict.fromkeys(f"{_where(o.spot, actuators)}: {_said(o.form)}" for each in found.alike for o in each)
+    alike = dict.fromkeys(f"{bench.where(o.spot)}: {_said(o.form)}" for each in found.alike for o in each)
     if found.is_map:
         about = dict.fromkeys(name for each in forms for name in each.about)
         says = f"No short law fits; a smooth map over {listed(list(about))} does."
@@ -34,7 +30,7 @@ def law_result(bench: TermRows, found: FoundLaw, before_um: float, after_um: flo
         says = law_sentence([each for each in forms if isinstance(each, Form)])
     if alike:
         says += f" These data cannot tell it from {listed(list(alike)[:3])}."
-    formula = "; ".join(f"{_where(spot, actuators)} = {each.formula or _over(each.over)}" for spot, each in parts)
+    formula = "; ".join(f"{bench.where(spot)} = {each.formula or _over(each.over)}" for spot, each in parts)
     envelope = {name: limits for _, each in parts for name, limits in each.envelope.items()}
     return Law(
         formula=formula, on=_stage(bench, found), terms=tuple(terms), envelope=envelope, after_rms_um=round(after_um, 3),
@@ -55,9 +51,7 @@ def _stage(bench: TermRows, found: FoundLaw) -> Stage:
     return "control" if on == "control" else "drive" if on in OF_ACTUATORS else "structure"
 
 
-def _formula_parts(
-    bench: TermRows, found: FoundLaw, actuators: Sequence[str]
-) -> tuple[list[tuple[Spot, LawPart]], list[LawTerm]]:
+def _formula_parts(bench: TermRows, found: FoundLaw) -> tuple[list[tuple[Spot, LawPart]], list[LawTerm]]:
     pairs: dict[Spot, list[tuple[float, str]]] = {}
     terms = []
     each = zip(found.by_term(found.theta), found.by_term(np.sqrt(np.diag(found.covariance))), found.terms, strict=True)
@@ -65,24 +59,17 @@ def _formula_parts(
         assert isinstance(term.form, Form)
         for value, s, text, unit in zip(theta, 1.96 * sd, term.form.said, term.form.units, strict=True):
             pairs.setdefault(term.spot, []).append((float(value), _tidy(text)))
-            terms.append(
-                LawTerm(
-                    term=f"{_where(term.spot, actuators)}: {_tidy(text)}", value=six_digits(value),
-                    ci95=(six_digits(value - s), six_digits(value + s)), unit=_unit(bench, term.spot, unit),
-                )
-            )  # fmt: skip
+            terms.append(_term(bench, term.spot, _tidy(text), value, (value - s, value + s), unit))
     parts = []
     for spot, own in pairs.items():
         formula = law_sum(own)
         names = parse(formula, dict.fromkeys(bench.rows(spot)[0])).names
         own_envelope = _envelope(bench, spot, names)
-        parts.append((spot, LawPart(effect="formula", formula=formula, envelope=own_envelope, **_at(spot, actuators))))
+        parts.append((spot, LawPart(effect="formula", formula=formula, envelope=own_envelope, **_at(bench, spot))))
     return parts, terms
 
 
-def _map_parts(
-    bench: TermRows, found: FoundLaw, actuators: Sequence[str]
-) -> tuple[list[tuple[Spot, LawPart]], list[LawTerm]]:
+def _map_parts(bench: TermRows, found: FoundLaw) -> tuple[list[tuple[Spot, LawPart]], list[LawTerm]]:
     parts, terms = [], []
     for term, theta in zip(found.terms, found.by_term(found.theta), strict=True):
         assert isinstance(term.form, SmoothForm)
@@ -90,24 +77,28 @@ def _map_parts(
         limits = zip(term.form.about, term.form.limits, strict=True)
         envelope = {name: (six_digits(low), six_digits(high)) for name, (low, high) in limits}
         part = LawPart(
-            effect="map", over=term.form.about, coefficients_mm=coefficients, envelope=envelope,
-            **_at(term.spot, actuators),
-        )  # fmt: skip
+            effect="map", over=term.form.about, coefficients_mm=coefficients, envelope=envelope, **_at(bench, term.spot)
+        )
         parts.append((term.spot, part))
-        low, high = six_digits(theta.min()), six_digits(theta.max())
-        terms.append(
-            LawTerm(
-                term=f"{_where(term.spot, actuators)}: {_over(term.form.about)}", value=max(abs(low), abs(high)),
-                ci95=(low, high), unit=_unit(bench, term.spot, ""),
-            )
-        )  # fmt: skip
+        ends = theta.min(), theta.max()
+        terms.append(_term(bench, term.spot, _over(term.form.about), max(map(abs, ends)), ends))
     return parts, terms
 
 
-def _at(spot: Spot, actuators: Sequence[str]) -> dict[str, str | None]:
+def _term(bench: TermRows, spot: Spot, text: str, value: float, ends: tuple[float, float], per: str = "") -> LawTerm:
+    """A term with its coefficient and the ends of the interval; per: unit that the coefficient is divided by."""
+    unit = bench.unit(spot)
+    return LawTerm(
+        term=f"{bench.where(spot)}: {text}", value=six_digits(value), ci95=(six_digits(ends[0]), six_digits(ends[1])),
+        unit=f"{unit}/{per}" if per else unit,
+    )  # fmt: skip
+
+
+def _at(bench: TermRows, spot: Spot) -> dict[str, str | None]:
     if spot.on in OF_ACTUATORS:
-        return {"stage": "control" if spot.on == "control" else "drive", "target": actuators[spot.index], "axis": None}
-    return {"stage": spot.on, "target": None, "axis": _AXES[spot.index]}
+        stage, target = "control" if spot.on == "control" else "drive", bench.actuators[spot.index]
+        return {"stage": stage, "target": target, "axis": None}
+    return {"stage": spot.on, "target": None, "axis": AXES[spot.index]}
 
 
 def _envelope(bench: TermRows, spot: Spot, names: Iterable[str]) -> dict[str, tuple[float, float]]:
@@ -129,12 +120,6 @@ def _said(form: Form | SmoothForm) -> str:
     return " and ".join(_tidy(each) for each in form.said) if isinstance(form, Form) else ""
 
 
-def _where(spot: Spot, actuators: Sequence[str]) -> str:
-    if spot.on in OF_ACTUATORS:
-        return f"{spot.on} {actuators[spot.index]}"
-    return f"tip {_AXES[spot.index]}"
-
-
 def where_of(part: LawPart) -> str:
     """Tip and axis, or stage and target, of a part."""
     return f"tip {part.axis}" if part.axis else f"{part.stage} {part.target}"
@@ -142,10 +127,6 @@ def where_of(part: LawPart) -> str:
 
 def _over(about: Sequence[str] | None) -> str:
     return f"map over {listed(about or ())}"
-
-
-def _unit(bench: TermRows, spot: Spot, per: str) -> str:
-    return f"{bench.unit(spot)}/{per}" if per else bench.unit(spot)
 
 
 def moved_without(bench: TermBench, found: FoundLaw) -> list[Floats]:
