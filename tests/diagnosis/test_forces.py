@@ -38,7 +38,7 @@ def test_rows_in_doubt_may_err_by_it_together(doubtful, elsewhere, shows):
         left[first : first + 30] += 6e-3
         inflate[first : first + 30] = doubtful
     problem = SimpleNamespace(
-        times=[np.arange(600) * 0.05], inflate=[inflate], floor=SimpleNamespace(slow_mm=1e-4, axis_mm=3e-3),
+        times=[np.arange(600) * 0.05], noise=SimpleNamespace(inflate=[inflate]), floor=SimpleNamespace(slow_mm=1e-4, axis_mm=3e-3),
         channels_of=lambda kind: slice(0, 3),
     )  # fmt: skip
     found = unexplained_of(problem, "tip", [left])

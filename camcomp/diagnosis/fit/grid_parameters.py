@@ -3,7 +3,7 @@
 The residual has no slope in a shape while its effect is absent, therefore the values of a grid are tried one by one.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -12,24 +12,24 @@ from camcomp.diagnosis.fit.columns import shape_default
 from camcomp.diagnosis.statistics.by_channel import AT_ONCE, ByChannel
 from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS
 from camcomp.diagnosis.statistics.folds import Folds
+from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Parameter
 
 _FINER = 17  # values between the neighbours of the best
-White = Callable[[int, ByChannel], ByChannel]  # what makes columns of a run white
 
 
-def best_shape(bench: Bench, candidate: CandidateCause, base: Folds, whitened: White) -> dict[str, float]:
+def best_shape(bench: Bench, candidate: CandidateCause, base: Folds, noise: Noise) -> dict[str, float]:
     """The scanned shape of an effect of the drive alone whose columns explain most of the residual."""
     p = candidate.shapes[0]
     values = np.asarray(p.scan)
     values = np.sort(values[values <= max(longest(bench, candidate, p), values.min())])
-    gains = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in values], base, whitened)
+    gains = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in values], base, noise)
     best = int(np.argmax(gains))
     # between its neighbours the gain has one peak, and a large effect off its peak leaves a residual like noise
     near = np.geomspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], _FINER)
-    finer = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in near], base, whitened)
+    finer = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in near], base, noise)
     value = near[int(np.argmax(finer))] if finer.max() > gains[best] else values[best]
     return {**shape_default(candidate), p.name: float(value)}
 
@@ -45,7 +45,7 @@ def longest(bench: Bench, candidate: CandidateCause, p: Parameter) -> float:
 
 def _gains(
     bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], base: Folds,
-    whitened: White,
+    noise: Noise,
 ) -> Floats:  # fmt: skip
     """Chi-square (v,) that an effect of the drive alone explains with each of v shapes under the prior of its size.
 
@@ -55,7 +55,7 @@ def _gains(
     count = max(AT_ONCE // (own * sum(map(len, base.residual))), 1)  # all together are as large as all other columns
     for i in range(0, len(shapes), count):
         some = shapes[i : i + count]
-        white = [whitened(k, each) for k, each in enumerate(quick_columns(bench, candidate, some))]
+        white = [noise.by_channel(k, each) for k, each in enumerate(quick_columns(bench, candidate, some))]
         G, h = base.alone(white, own)
         G = G + np.eye(own) / PRIOR_WIDTHS[-1] ** 2
         gains.append(np.einsum("vp,vp->v", h, np.linalg.solve(G, h[:, :, None])[:, :, 0]))
@@ -64,7 +64,7 @@ def _gains(
 
 def settled_interval(
     bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], base: Folds,
-    whitened: White,
+    noise: Noise,
 ) -> dict[str, float]:  # fmt: skip
     """The interval, near the best candidate interval, whose columns explain most after the removal of the other
     columns.
@@ -72,7 +72,7 @@ def settled_interval(
     An interval that begins at a reversal resembles play: a residual without all plays shows less of it there.
     """
     paths = [run.run_path for run in bench.runs]
-    every = _gains(bench, candidate, shapes, base, whitened)
+    every = _gains(bench, candidate, shapes, base, noise)
     best, (start, end) = dict(shapes[int(every.argmax())]), [p.name for p in candidate.shapes]
     run = next((p for p in paths if p.started <= 0.5 * (best[start] + best[end]) <= p.started + p.time[-1]), paths[0])
     row, step, most = float(np.median(np.diff(run.time))), 4, -np.inf
@@ -81,7 +81,7 @@ def settled_interval(
         near = [each for each in near if each[end] - each[start] > 2 * row]
         if not near:
             return best
-        gains = _gains(bench, candidate, near, base, whitened)
+        gains = _gains(bench, candidate, near, base, noise)
         if gains.max() > most and gains.argmax() > 0:
             most, best = float(gains.max()), near[int(gains.argmax())]
         else:

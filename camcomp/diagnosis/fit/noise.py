@@ -7,6 +7,7 @@ from scipy.stats import chi2
 
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.floor import NoiseFloor, row_scatter
+from camcomp.diagnosis.fit.outliers import tails
 from camcomp.diagnosis.fit.starts import unknown_starts
 from camcomp.diagnosis.model.noise import MINOR, rounding_noise
 from camcomp.diagnosis.statistics.noise_model import Noise, weighted_median
@@ -42,7 +43,9 @@ def instrument_noise(bench: Bench, floor: NoiseFloor, least: Floats, times: Sequ
         sigma[k] = np.where(known, whole, np.nan)
         if bench.runs[k].run_path.ordered:
             slow[k], memory[k] = (lasting / whole) ** 2, np.exp(-step / REMEMBERED_S)
-    return Noise(sigma, slow, memory)
+    every = zip(inflation(bench), sigma, tails(bench), strict=True)
+    inflate = [np.sqrt(1.0 + (extra / own) ** 2) * heavy for extra, own, heavy in every]
+    return Noise(sigma, slow, memory, inflate, times)
 
 
 def inflation(bench: Bench) -> list[Floats]:

@@ -18,8 +18,8 @@ from camcomp.diagnosis.fit.floor import least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, settled_interval
 from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, log_intervals, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
-from camcomp.diagnosis.fit.noise import inflation, instrument_noise
-from camcomp.diagnosis.fit.outliers import outlying, tails
+from camcomp.diagnosis.fit.noise import instrument_noise
+from camcomp.diagnosis.fit.outliers import outlying
 from camcomp.diagnosis.fit.patterns import Dictionary, dictionary
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.noise import HEALTHY, MINOR
@@ -43,8 +43,6 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     times = [thinned(run.run_path.time, run.thin) for run in bench.runs]
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
     noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
-    every = zip(inflation(bench), noise.sigma, tails(bench), strict=True)
-    inflate = [np.sqrt(1.0 + (extra / sigma) ** 2) * heavy for extra, sigma, heavy in every]
     guessed = {i: guess for i, each in enumerate(candidates) if (guess := first_guess(bench, each)) is not None}
     columns = build(bench, candidates, guessed, floor.tip_um)
     shapes: dict[int, dict[str, float]] = {
@@ -52,7 +50,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     }
     problem = _whitened(
         Problem(
-            bench=bench, columns=columns, dictionary=Dictionary((), (), ()), inflate=inflate, times=times, residuals=residuals,
+            bench=bench, columns=columns, dictionary=Dictionary((), (), ()), times=times, residuals=residuals,
             floor=floor, noise=noise, outliers=outliers, white=[], white_patterns=[], white_residual=[],
             shapes=shapes, candidates=cause_prior(columns),
         )
@@ -103,7 +101,7 @@ def _with_model_error(problem: Problem) -> Noise:
     for k, (W, r) in enumerate(zip(problem.white, problem.white_residual, strict=True)):
         left, at = (r - W @ mean) ** 2, 0
         for c in range(sigma.shape[1]):
-            rows = int(np.isfinite(problem.inflate[k][:, c]).sum()) if np.isfinite(sigma[k, c]) else 0
+            rows = int(np.isfinite(problem.noise.inflate[k][:, c]).sum()) if np.isfinite(sigma[k, c]) else 0
             if c >= 3 and rows:
                 sigma[k, c] *= max(1.0, float(np.sqrt(np.mean(left[at : at + rows]))))
             at += rows
@@ -112,14 +110,13 @@ def _with_model_error(problem: Problem) -> Noise:
 
 def _whitened(problem: Problem, words: Dictionary | None = None) -> Problem:
     """The problem with its columns, patterns and residuals white under its noise."""
-    every = [(k, own, t) for k, (own, t) in enumerate(zip(problem.inflate, problem.times, strict=True))]
-    noise, residuals = problem.noise, problem.residuals
+    noise = problem.noise
     return replace(
         problem,
         dictionary=problem.dictionary if words is None else replace(words, blocks=()),  # white they are enough
-        white=[noise.by_channel(k, problem.columns.blocks[k], own, t) for k, own, t in every],
-        white_patterns=[noise.by_channel(k, words.blocks[k], own, t) for k, own, t in every] if words else [],
-        white_residual=[noise.rows(k, residuals[k][:, :, None], own, t)[:, 0] for k, own, t in every],
+        white=[noise.by_channel(k, each) for k, each in enumerate(problem.columns.blocks)],
+        white_patterns=[noise.by_channel(k, each) for k, each in enumerate(words.blocks)] if words else [],
+        white_residual=[noise.rows(k, each[:, :, None])[:, 0] for k, each in enumerate(problem.residuals)],
     )
 
 
@@ -143,13 +140,13 @@ def _scanned(problem: Problem) -> Problem:
             continue
         if problem.passing(i):
             always = quick_columns(problem.bench, candidate, [never_ending(candidate)])
-            white = [problem.white_columns(k, each) for k, each in enumerate(always)]
+            white = [problem.noise.by_channel(k, each) for k, each in enumerate(always)]
             near = likely_intervals(problem.bench, candidate, white, rest, problem.row_places)
             if not near:
                 continue
-            best = settled_interval(problem.bench, candidate, near, base, problem.white_columns)
+            best = settled_interval(problem.bench, candidate, near, base, problem.noise)
         else:
-            best = best_shape(problem.bench, candidate, base, problem.white_columns)
+            best = best_shape(problem.bench, candidate, base, problem.noise)
         problem.shapes[i] = best
         columns = candidate_columns(problem.bench, candidate, best)
         changed.append((list(problem.candidates.columns[i]), columns))
@@ -163,5 +160,5 @@ def _scanned(problem: Problem) -> Problem:
         for k in range(len(blocks)):
             new = np.stack([each[k] for each in columns], axis=2)
             blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))
-            whole[k] = whole[k].exchanged(index, problem.whitened(k, new))
+            whole[k] = whole[k].exchanged(index, problem.noise.rows(k, new))
     return replace(problem, columns=replace(problem.columns, blocks=tuple(blocks), prior=prior), white=whole)

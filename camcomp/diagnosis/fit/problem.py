@@ -39,7 +39,6 @@ class Problem:
     bench: Bench
     columns: Columns
     dictionary: Dictionary
-    inflate: list[Floats]
     times: list[Floats]
     residuals: list[Floats]
     floor: NoiseFloor
@@ -97,14 +96,6 @@ class Problem:
     def base_grams(self) -> tuple[NormalEquations, ...]:
         """Per run, at nominal."""
         return tuple(gram(D, r) for D, r in zip(self.white, self.white_residual, strict=True))
-
-    def whitened(self, k: int, values: Floats) -> Floats:
-        """White rows (w, j) of channels (n, c, j) of run k."""
-        return self.noise.rows(k, values, self.inflate[k], self.times[k])
-
-    def white_columns(self, k: int, columns: ByChannel) -> ByChannel:
-        """The same of columns over the channels of run k, n rows each."""
-        return self.noise.by_channel(k, columns, self.inflate[k], self.times[k])
 
     def causes(self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]) -> list[Cause]:
         """Causes at coordinates theta (d,)."""
@@ -172,7 +163,7 @@ class Problem:
             if step >= passes and not far:
                 break
             theta, readings = self._readings(members, theta, shapes)
-            now = [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
+            now = [self.noise.rows(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
             bend = self._bend(now, index, theta)
             if step == 0 and not shapes and bend < STRAIGHT:
                 theta = self._bounded(members, estimate(sum_grams(grams), self.prior, index)[0][index])
@@ -217,7 +208,7 @@ class Problem:
         """White columns (w, p) of run k that bend the machine farther (k,) than at nominal: the tip moves more, the force is the same."""
         pushed = np.flatnonzero(farther > 1.0)
         out: Floats = self.white[k][:, pushed]
-        tip = np.isfinite(self.inflate[k][:, :3]) & np.isfinite(self.noise.sigma[k, :3])
+        tip = np.isfinite(self.noise.inflate[k][:, :3]) & np.isfinite(self.noise.sigma[k, :3])
         out[: int(tip.sum())] *= farther[pushed]
         return out
 
@@ -256,7 +247,7 @@ class Problem:
         W: Floats = self.white[k][:, index]
         new = [j for j, m in enumerate(moved) if m is not None]
         if new:
-            W[:, new] = self.whitened(k, np.stack([m for m in moved if m is not None], axis=2))
+            W[:, new] = self.noise.rows(k, np.stack([m for m in moved if m is not None], axis=2))
         return W
 
     def _grams_at(
@@ -331,7 +322,7 @@ class Problem:
             step = 1e-4 * shapes[i][p.name]
             changed = {**shapes, i: {**shapes[i], p.name: shapes[i][p.name] + step}}
             moved.append(self._slope(self.causes(members, theta, changed), readings, step))
-        return [self.whitened(k, np.stack([m[k] for m in moved], axis=2)) for k in range(len(readings))]
+        return [self.noise.rows(k, np.stack([m[k] for m in moved], axis=2)) for k in range(len(readings))]
 
     def shapes_of(self, members: Members) -> list[tuple[int, Parameter]]:
         """(candidate, shape) of a set in order; instants are not refined."""
@@ -343,7 +334,7 @@ class Problem:
 
     def row_cells(self, k: int) -> tuple[Ints, Ints]:
         """Channel and row (w,) of every white row of run k."""
-        channel, row = np.nonzero((np.isfinite(self.inflate[k]) & np.isfinite(self.noise.sigma[k])).T)
+        channel, row = np.nonzero((np.isfinite(self.noise.inflate[k]) & np.isfinite(self.noise.sigma[k])).T)
         return channel, row
 
     def row_places(self, k: int) -> Floats:

@@ -41,7 +41,7 @@ class LawAnswer:
 
 def term_bench(problem: Problem) -> TermBench:
     """Where terms are evaluated for a problem."""
-    return TermBench(problem.bench, problem.noise, problem.inflate, problem.times)
+    return TermBench(problem.bench, problem.noise)
 
 
 def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:

@@ -116,10 +116,10 @@ class TermRows(ABC):
 
 
 class TermBench(TermRows):
-    """Evaluates terms on the runs of a bench; noise, inflate, times: of its rows, as a Problem has them."""
+    """Evaluates terms on the runs of a bench; noise: of its rows."""
 
-    def __init__(self, bench: Bench, noise: Noise, inflate: Sequence[Floats], times: Sequence[Floats]) -> None:
-        self.bench, self.noise, self.inflate, self.times = bench, noise, inflate, times
+    def __init__(self, bench: Bench, noise: Noise) -> None:
+        self.bench, self.noise = bench, noise
         self._rows: dict[tuple[str, int], list[Rows]] = {}
         self._reaches: dict[tuple[Spot, int], tuple[list[int], Floats]] = {}
         self.actuators, self.row_counts = bench.actuators, [len(run.run_path.time) for run in bench.runs]
@@ -184,18 +184,17 @@ class TermBench(TermRows):
         channels, ways = self._reach(spot, k)
         moved = dict(zip(channels, means(values, ways, run.thin), strict=True))
         none = every[:0], np.zeros((len(values) // run.thin, 0))
-        parts = [(every, moved[c]) if c in moved else none for c in range(self.inflate[k].shape[1])]
+        parts = [(every, moved[c]) if c in moved else none for c in range(self.noise.sigma.shape[1])]
         return ByChannel(len(every), tuple(parts))
 
     def white(self, spot: Spot, values: Sequence[Floats]) -> RunColumns:
         """Functions (n, f) per run as white columns of the channels that the spot reaches."""
-        every = enumerate(zip(values, self.inflate, self.times, strict=True))
-        return [self.noise.by_channel(k, self.reached(spot, k, v), own, t) for k, (v, own, t) in every]
+        return [self.noise.by_channel(k, self.reached(spot, k, v)) for k, v in enumerate(values)]
 
     def shown(self, spot: Spot) -> list[Floats]:
         """Instants per run, on the common clock, of rows in which some channel that the spot reaches is known."""
         out = []
-        for k, (run, t, inflate) in enumerate(zip(self.bench.runs, self.times, self.inflate, strict=True)):
+        for k, (run, t, inflate) in enumerate(zip(self.bench.runs, self.noise.time, self.noise.inflate, strict=True)):
             seen = np.isfinite(inflate[:, self._reach(spot, k)[0]]).any(axis=1)
             out.append(run.run_path.started + t[seen])
         return out

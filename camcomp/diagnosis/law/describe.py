@@ -131,10 +131,10 @@ def _over(about: Sequence[str] | None) -> str:
 
 def moved_without(bench: TermBench, found: FoundLaw) -> list[Floats]:
     """Tip motion (n, 3) mm in every run by the law fitted to the other parts."""
-    out = [np.zeros((len(t), 3)) for t in bench.times]
+    out = [np.zeros((len(t), 3)) for t in bench.noise.time]
     for term, theta in zip(found.terms, found.by_term(found.theta_without), strict=True):
         for k, moved in enumerate(bench.moves(term.spot, bench.values(term.spot, term.form))):
-            time, split = bench.times[k], found.folds.split
+            time, split = bench.noise.time[k], found.folds.split
             place = (time - time[0]) / max(float(time[-1] - time[0]), 1e-12)
             out[k] += np.einsum("nic,nc->ni", moved, theta[k * split.parts + split.of(place)])
     return out

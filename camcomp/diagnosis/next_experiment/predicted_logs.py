@@ -183,10 +183,11 @@ def _noise(problem: Problem) -> Floats:
 
 def _whitened(problem: Problem, bench: Bench, values: Floats) -> tuple[Floats, NDArray[np.str_]]:
     """White rows (w, k) of values (n, c, k), and the kind of channel (w,) of each."""
-    noise = replace(problem.noise, sigma=_noise(problem)[None, :])
-    inflate = np.sqrt(1.0 + (inflation(bench)[0] / noise.sigma) ** 2)
+    sigma, time = _noise(problem)[None, :], [bench.runs[0].run_path.time]
+    inflate = np.sqrt(1.0 + (inflation(bench)[0] / sigma) ** 2)
+    noise = replace(problem.noise, sigma=sigma, inflate=[inflate], time=time)
     kinds = np.array([problem.kind_of(c) for c in range(inflate.shape[1])])
-    return noise.rows(0, values, inflate, bench.runs[0].run_path.time), kinds[np.nonzero(np.isfinite(inflate).T)[0]]
+    return noise.rows(0, values), kinds[np.nonzero(np.isfinite(inflate).T)[0]]
 
 
 def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:

@@ -92,7 +92,7 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
     weight: list[Floats] = []
     for k, values in enumerate(at_tip):
         t = problem.times[k]
-        inflate = problem.inflate[k][:, problem.channels_of(kind)]
+        inflate = problem.noise.inflate[k][:, problem.channels_of(kind)]
         if kind != "tip":  # each channel moves the tip along its own way: the worst of them counts
             inflate = np.repeat(np.nanmax(np.nan_to_num(inflate, nan=1.0), axis=1)[:, None], 3, axis=1)
         values = np.where(inflate < 3.0, values, np.nan)

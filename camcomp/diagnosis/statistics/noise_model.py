@@ -4,7 +4,9 @@ A block is one run: residuals (n, c) over c channels, NaN where a channel has no
 The slow part is a first-order autoregression; whitening is the exact innovations form (Kalman 1960).
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -17,53 +19,42 @@ BLOCK = 8  # rows that are averaged, or whose noise shares a sign
 
 
 @dataclass(frozen=True, eq=False)
-class _Channel:
-    """Rows (w,) that a channel of a run has, their deviation (w,), and which of them (w,) start afresh."""
-
-    rows: Ints
-    scale: Floats
-    fresh: Bools
-
-
-@dataclass(frozen=True, eq=False)
 class Noise:
-    """Per run and channel (runs, c): sigma size of one row, slow share of the variance that remembers, memory from row to row."""
+    """Per run and channel (runs, c): sigma size of one row, slow share of the variance that remembers, memory from row to row.
+
+    Per run: inflate (n, c) >= 1, by how much a row is less certain than its channel, NaN where it has no value; time (n,) s.
+    """
 
     sigma: Floats
     slow: Floats
     memory: Floats
-    _laid: dict[int, tuple[Floats, Floats, dict[int, _Channel]]] = field(default_factory=dict, init=False, repr=False)
+    inflate: Sequence[Floats]
+    time: Sequence[Floats]
 
-    def rows(self, run: int, values: Floats, inflate: Floats, time: Floats) -> Floats:
-        """White rows (w, k) of values (n, c, k): channel by channel, missing rows left out.
+    @cached_property
+    def _channels(self) -> list[dict[int, tuple[Ints, Floats, Bools]]]:
+        """Per run, of every channel that has some: its rows (w,), their deviation (w,), and which of them start afresh."""
+        out = []
+        for inflate, time, sigma in zip(self.inflate, self.time, self.sigma, strict=True):
+            present = np.isfinite(inflate) & np.isfinite(sigma)
+            found = {j: np.flatnonzero(present[:, j]) for j in np.flatnonzero(present.any(axis=0)).tolist()}
+            out.append({j: (rows, sigma[j] * inflate[rows, j], _starts(time[rows])) for j, rows in found.items()})
+        return out
 
-        inflate (n, c) >= 1: by how much a row is less certain than its channel. time (n,) s.
-        """
+    def rows(self, run: int, values: Floats) -> Floats:
+        """White rows (w, k) of values (n, c, k): channel by channel, missing rows left out."""
         channels = ByChannel.of(values[:, j] for j in range(values.shape[1]))
-        return np.asarray(self.by_channel(run, channels, inflate, time)[:, np.arange(values.shape[2])])
+        return np.asarray(self.by_channel(run, channels)[:, np.arange(values.shape[2])])
 
-    def by_channel(self, run: int, values: ByChannel, inflate: Floats, time: Floats) -> ByChannel:
+    def by_channel(self, run: int, values: ByChannel) -> ByChannel:
         """The same of values whose channels, n rows each, lie one behind the other."""
-        known, parts = self._known(run, inflate, time), []
-        for j, (on, x) in enumerate(values.parts):
-            if j in known:
-                each, white = known[j], np.empty((len(known[j].rows), len(on)))
-                _innovations(x, each.rows, each.scale, each.fresh, self.slow[run, j], self.memory[run, j], white)
-                parts.append((on, white))
+        parts = []
+        for j, (rows, scale, fresh) in self._channels[run].items():
+            on, x = values.parts[j]
+            white = np.empty((len(rows), len(on)))
+            _innovations(x, rows, scale, fresh, self.slow[run, j], self.memory[run, j], white)
+            parts.append((on, white))
         return ByChannel(values.width, tuple(parts))
-
-    def _known(self, run: int, inflate: Floats, time: Floats) -> dict[int, _Channel]:
-        """The channels of a run that have rows; those of a problem are asked for again and again."""
-        kept = self._laid.get(run)
-        if kept is None or kept[0] is not inflate or kept[1] is not time:
-            found = {}
-            for j in range(inflate.shape[1]):
-                present = np.isfinite(inflate[:, j])
-                if present.any() and np.isfinite(self.sigma[run, j]):
-                    scale = self.sigma[run, j] * inflate[present, j]
-                    found[j] = _Channel(np.flatnonzero(present), scale, starts(time, present))
-            kept = self._laid[run] = (inflate, time, found)
-        return kept[2]
 
 
 @kept
@@ -84,12 +75,9 @@ def _innovations(x, rows, scale, fresh, slow, memory, out):  # type: ignore[no-u
         unsure = memory * memory * unsure * (1.0 - gain) + slow * (1.0 - memory * memory)
 
 
-def starts(time: Floats, present: Bools) -> Bools:
-    """Of the rows present: which begin after a gap in time (n,) or in the channel."""
-    index = np.flatnonzero(present)
-    if len(index) == 0:
-        return np.zeros(0, bool)
-    return np.concatenate([[True], missing_rows(time[index]) | (np.diff(time[index]) <= 0.0)])
+def _starts(time: Floats) -> Bools:
+    """Which rows of a channel at times (n,) begin after a gap."""
+    return np.append(True, missing_rows(time) | (np.diff(time) <= 0.0))
 
 
 def effective_rows(noise: Noise, channel: int, n: int) -> float:

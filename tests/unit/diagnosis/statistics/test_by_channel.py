@@ -71,11 +71,10 @@ def test_columns_are_exchanged_and_put_beside(lean, whole):
 
 
 def test_it_is_made_white_as_an_array_is(lean, values):
-    noise = Noise(*(np.full((1, CHANNELS), x) for x in (0.5, 0.4, 0.9)))
     time, inflate = 0.02 * np.arange(N), np.ones((N, CHANNELS))
     inflate[2, 0], inflate[:, 2] = np.nan, np.nan
-    white = noise.by_channel(0, lean, inflate, time)
-    assert np.array_equal(white[:, np.arange(K)], noise.rows(0, values, inflate, time))
+    noise = Noise(*(np.full((1, CHANNELS), x) for x in (0.5, 0.4, 0.9)), [inflate], [time])
+    assert np.array_equal(noise.by_channel(0, lean)[:, np.arange(K)], noise.rows(0, values))
 
 
 def test_matrices_are_joined_one_behind_the_other(lean, values):

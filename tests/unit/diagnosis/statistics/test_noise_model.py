@@ -19,8 +19,9 @@ def coloured(rng, n, slow, memory, sigma):
 def test_rows_are_white_and_of_size_one(slow, memory):
     rng = np.random.default_rng(1)
     runs = [coloured(rng, 2000, slow, memory, 0.003)[:, None] for _ in range(6)]
-    noise, time = Noise(*(np.full((6, 1), x) for x in (0.003, slow, memory))), 0.02 * np.arange(2000)
-    white = np.concatenate([noise.rows(r, x[:, :, None], np.ones_like(x), time)[:, 0] for r, x in enumerate(runs)])
+    time = 0.02 * np.arange(2000)
+    noise = Noise(*(np.full((6, 1), x) for x in (0.003, slow, memory)), [np.ones_like(x) for x in runs], [time] * 6)
+    white = np.concatenate([noise.rows(r, x[:, :, None])[:, 0] for r, x in enumerate(runs)])
     assert np.std(white) == pytest.approx(1.0, abs=0.05)
     lags = [np.mean(white[k:] * white[:-k]) for k in (1, 2, 5, 10, 20)]
     assert np.abs(lags).max() < 0.06
@@ -29,15 +30,15 @@ def test_rows_are_white_and_of_size_one(slow, memory):
 def test_a_mean_of_slow_noise_is_worth_as_many_rows_as_its_scatter_says():
     rng = np.random.default_rng(4)
     means = [coloured(rng, 2000, 0.5, 0.9, 1.0).mean() for _ in range(300)]
-    noise = Noise(*(np.full((1, 1), x) for x in (1.0, 0.5, 0.9)))
+    noise = Noise(*(np.full((1, 1), x) for x in (1.0, 0.5, 0.9)), [], [])
     assert effective_rows(noise, 0, 2000) == pytest.approx(1.0 / np.mean(np.square(means)), rel=0.2)
 
 
 def test_a_gap_forgets():
-    noise = Noise(np.ones((1, 1)), np.full((1, 1), 0.9), np.full((1, 1), 0.95))
     x, time = np.ones((40, 1, 1)), np.arange(40.0)
     time[20:] += 100.0
-    rows = noise.rows(0, x, np.ones((40, 1)), time)[:, 0]
+    noise = Noise(np.ones((1, 1)), np.full((1, 1), 0.9), np.full((1, 1), 0.95), [x[:, 0]], [time])
+    rows = noise.rows(0, x)[:, 0]
     assert np.array_equal(rows[20:], rows[:20])
     assert rows[0] == pytest.approx(1.0)
     assert rows[19] < 0.6
