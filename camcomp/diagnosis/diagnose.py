@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.answer.held_out import shrinkage_of
-from camcomp.diagnosis.answer.locate import channel_axes, run_gaps
-from camcomp.diagnosis.answer.minor import MOST_LISTED, minor_effects
 from camcomp.diagnosis.answer.nested import causes_without
-from camcomp.diagnosis.fit.bench import Bench, Run
+from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import floor_um, gap_sizes, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
@@ -25,10 +23,11 @@ from camcomp.diagnosis.law.answer import LawAnswer, answer_law
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.classes import MOST_SETS
-from camcomp.diagnosis.model.noise import MINOR
+from camcomp.diagnosis.model.noise import HEALTHY, MINOR, REPEATABILITY_MM
 from camcomp.diagnosis.next_experiment.designed import Proposal, explore, propose
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import (
+    MOST_LISTED,
     SOMETHING_UNKNOWN,
     DiagnosisResult,
     Driver,
@@ -36,6 +35,7 @@ from camcomp.diagnosis.result.types import (
     Floor,
     FoundCause,
     GapSize,
+    MinorEffect,
     NamedCause,
     NextExperiment,
     Outlier,
@@ -49,6 +49,8 @@ from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.evidence import estimate
+from camcomp.diagnosis.statistics.noise_model import effective_rows
 from camcomp.diagnosis.statistics.periods import frequencies
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance
 from camcomp.ground.datatypes import Floats
@@ -128,7 +130,7 @@ def diagnose(
         causes=_causes(stands, found, best, law),
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
         shrinkage=shrinkage_of(stands, best, judged, chosen) if unseen else None,
-        next_experiment=proposed, minor=minor_effects(stands, best),
+        next_experiment=proposed, minor=_minor_effects(stands, best),
         outliers=outliers, floor=Floor(um=gap.noise_floor_um, source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(problem)),
         standards=of_runs(twin, runs),
@@ -277,16 +279,30 @@ def _named(problem: Problem, i: int) -> NamedCause:
     return NamedCause(effect=problem.columns.candidates[i].name, target=problem.columns.candidates[i].target)
 
 
+def _minor_effects(problem: Problem, f: Fitted) -> tuple[MinorEffect, ...]:
+    """Effects of a fit with shrinkage that are listed apart from the causes, because they are below MINOR, the largest first."""
+    mean, _ = estimate(f.data, problem.prior, problem.member_columns(f.members))
+    found = []
+    for i, (candidate, columns) in enumerate(zip(problem.columns.candidates, problem.candidates.columns, strict=True)):
+        if i in f.members or not columns:
+            continue
+        index = list(columns)
+        size = problem.size_um(index, mean[index])
+        if size > HEALTHY * problem.floor.tip_um:
+            found.append(MinorEffect(effect=candidate.name, target=candidate.target, size_um=round(size, 3)))
+    return tuple(sorted(found, key=lambda each: -each.size_um)[:MOST_LISTED])
+
+
 # -- where ------------------------------------------------------------------------------------------------------------
 
 
 def _where(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer | None) -> Where:
-    gaps = run_gaps(problem)
-    at = places.axes(gaps, channel_axes(problem))
-    heard = frequencies(gaps, channel_axes(problem))
+    gaps = _run_gaps(problem)
+    channels = ["x", "y", "z"] if main_channels(problem).start == 0 else list(problem.bench.actuators)
+    at, heard = places.axes(gaps, channels), frequencies(gaps, channels)
     left = gaps  # what is unknown acts where the known causes leave something
     if found.unknown_in and best.members:
-        left = run_gaps(problem, problem.causes(best.members, best.theta, best.extra))
+        left = _run_gaps(problem, problem.causes(best.members, best.theta, best.extra))
     return Where.model_validate({
         "stage": _stage(problem, best, found, law),
         "axes": {axis: at.get(axis, 0.0) for axis in "xyz"},
@@ -296,6 +312,31 @@ def _where(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer | 
         "drivers": _drivers(problem, found, heard),
         "frequencies": heard,
     })  # fmt: skip
+
+
+def _run_gaps(problem: Problem, causes: Sequence[Cause] = ()) -> list[places.RunGap]:
+    """Every run's gap, or what causes leave of it, in the main channels."""
+    part = main_channels(problem)
+    m = len(problem.bench.actuators)
+    out = []
+    for k, run in enumerate(problem.bench.runs):
+        gap = problem.bench.gap(k, causes)[:, part]
+        noise = problem.noise.sigma[k, part]
+        thin = float(np.mean([1.0 / effective_rows(problem.noise, c, 1) for c in range(part.start, part.stop)]))
+        line = thinned(run.measured.line, run.thin)
+        if part.start == 0:
+            slope = problem.bench.thin_slopes[k]
+            clean = np.where(np.isfinite(gap), gap, 0.0)
+            drives = np.einsum("nij,nj->ni", np.linalg.pinv(slope), clean)
+        else:
+            drives = gap if gap.shape[1] == m else np.zeros((len(gap), m))
+        noise = np.where(np.isfinite(noise), np.hypot(noise, REPEATABILITY_MM if part.start == 0 else 0.0), 1.0)
+        out.append(
+            places.RunGap(
+                name=run.name, gap=gap, noise=noise, thin=thin, time=problem.times[k], line=line, drives=drives
+            )
+        )
+    return out
 
 
 def _stage(problem: Problem, best: Fitted, found: CauseSearch, law: LawAnswer | None) -> str:

@@ -1,1 +1,1 @@
-"""From the best set to the answer: sizes, intervals, places, shrinkage on unseen runs."""
+"""From the best set to the answer: shrinkage on unseen runs, by what is chosen without them."""

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from scipy.stats import ranksums as rank_sums
 
-from camcomp.diagnosis.answer.minor import MOST_LISTED
 from camcomp.diagnosis.arm.case import PoseCase
 from camcomp.diagnosis.arm.curves import curve_cause
 from camcomp.diagnosis.arm.linear import BY
@@ -20,6 +19,7 @@ from camcomp.diagnosis.model.folds import REGIONS, without_nuisances
 from camcomp.diagnosis.model.noise import HEALTHY, LEAST_VALUES, MINOR
 from camcomp.diagnosis.model.verdict import decide
 from camcomp.diagnosis.result.types import (
+    MOST_LISTED,
     Driver,
     Estimate,
     FoundCause,

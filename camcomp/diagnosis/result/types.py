@@ -19,6 +19,7 @@ Stage = Literal["control", "drive", "structure", "process", "tool", "workpiece",
 Share = float  # of the gap's energy, 0 to 1
 Pair = Annotated[tuple[float, float], Field(description="low and high end")]
 UNKNOWN: Literal["unknown"] = "unknown"
+MOST_LISTED = 8  # minor effects, or drivers of a gap
 
 
 def six_digits(value: float) -> float:
