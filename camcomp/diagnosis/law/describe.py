@@ -59,7 +59,7 @@ def _formula_parts(bench: TermRows, found: FoundLaw) -> tuple[list[tuple[Spot, L
         assert isinstance(term.form, Form)
         for value, s, text, unit in zip(theta, 1.96 * sd, term.form.said, term.form.units, strict=True):
             pairs.setdefault(term.spot, []).append((float(value), _tidy(text)))
-            terms.append(_term(bench, term.spot, _tidy(text), value, (value - s, value + s), unit))
+            terms.append(_term(bench, term.spot, _tidy(text), value, (value - s, value + s), per=unit))
     parts = []
     for spot, own in pairs.items():
         formula = law_sum(own)
