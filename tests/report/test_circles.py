@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.circles import OUTWARD, turns_of
-from camcomp.diagnosis.report.circles import circles_section, gaps_of
+from camcomp.diagnosis.circles import OUTWARD
+from camcomp.diagnosis.report.circles import circles_of, circles_section
 from camcomp.diagnosis.report.run_view import RunView
 from camcomp.diagnosis.result.standards import CircularTest, CircularTurn
 from camcomp.diagnosis.statistics.standard_values import circular_deviation
@@ -94,18 +94,18 @@ def test_values_stand_beside_the_plots():
 def test_few_rows_make_no_polygon():
     """Sixty rows a turn: chords between them would make a round path deviate by 34 um."""
     one = view("a", clockwise=False, radial=lambda t: 4.0 + 0.0 * t, rows=121)
-    (turn,) = turns_of(one.program, one.commanded, one.before)
+    ((_, turn),) = circles_of([one])
     assert turn.off(one.position + 1e-3 * one.before) == pytest.approx(4.0, abs=1e-6)
-    assert gaps_of([one])[0].before == pytest.approx(4.0, abs=1e-6)
+    assert turn.radial(one.before) == pytest.approx(4.0, abs=1e-6)
 
 
 def test_half_a_circle_is_none():
     whole = view("a", clockwise=False, radial=np.cos)
     whole.before[np.sin(ANGLES) > 0.3] = np.nan
-    assert gaps_of([whole]) == [] and circles_section([whole], ()) is None
+    assert circles_of([whole]) == [] and circles_section([whole], ()) is None
 
 
 def test_a_run_whose_tip_was_not_measured_in_x_y_z_has_no_circle():
     whole = view("a", clockwise=False, radial=np.cos)
     across = ("along the path", "across the path", "normal to both")
-    assert gaps_of([dataclasses.replace(whole, channels=across)]) == []
+    assert circles_of([dataclasses.replace(whole, channels=across)]) == []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,35 +22,25 @@ _ISO = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class RadialGap:
-    """Radial gap, measured minus modelled, of a circle in one direction in one run, um at every degree (360,)."""
-
-    run: str
-    turn: Turn
-    before: Floats
-    after: Floats
-    cutting: bool
-
-
-def gaps_of(views: Sequence[RunView]) -> list[RadialGap]:
-    """Radial gaps of all full circles with a measured tip, in the order of the runs."""
-    out = []
-    for view in views:
-        if view.program is not None and view.channels == _TIP:
-            for turn in turns_of(view.program, view.commanded, view.before):
-                out.append(RadialGap(view.name, turn, turn.radial(view.before), turn.radial(view.after), view.cutting))
-    return out
+def circles_of(views: Sequence[RunView]) -> list[tuple[RunView, Turn]]:
+    """All full circles with a measured tip and their runs, in the order of the runs."""
+    seen = [(view, view.program) for view in views if view.channels == _TIP]
+    return [
+        (view, turn)
+        for view, program in seen
+        if program is not None
+        for turn in turns_of(program, view.commanded, view.before)
+    ]
 
 
 def circles_section(views: Sequence[RunView], tests: Sequence[CircularTest]) -> Section | None:
     """Section of the report on circles, or None without a circle. tests: values of ISO 230-4."""
-    groups: dict[tuple[str, bool], list[RadialGap]] = {}
-    for gap in gaps_of(views):
-        groups.setdefault((gap.turn.circle.name, gap.cutting), []).append(gap)
+    groups: dict[tuple[str, bool], list[tuple[RunView, Turn]]] = {}
+    for view, turn in circles_of(views):
+        groups.setdefault((turn.circle.name, view.cutting), []).append((view, turn))
     if not groups and not tests:
         return None
-    order = sorted(groups, key=lambda key: -max(float(np.nanmax(np.abs(gap.before))) for gap in groups[key]))
+    order = sorted(groups, key=lambda key: -_largest(groups[key]))
     figures = [_figure(groups[key], i) for i, key in enumerate(order[:MOST_DRAWN], 1)]
     rank = {key: i for i, key in enumerate(order)}
     shown = sorted(tests, key=lambda test: rank.get((test.circle, test.cutting), len(order)))
@@ -75,10 +64,15 @@ def _load(cutting: bool) -> str:
     return "cutting" if cutting else "in air"
 
 
-def _figure(gaps: Sequence[RadialGap], number: int) -> Figure:
+def _largest(driven: Sequence[tuple[RunView, Turn]]) -> float:
+    """Largest radial gap, measured minus modelled, um."""
+    return max(float(np.nanmax(np.abs(turn.radial(view.before)))) for view, turn in driven)
+
+
+def _figure(driven: Sequence[tuple[RunView, Turn]], number: int) -> Figure:
     """Radial gap round a circle, both directions, before and with the causes found; a slider enlarges it."""
-    circle = gaps[0].turn.circle
-    name = f"{circle.name}, {_load(gaps[0].cutting)}"
+    circle = driven[0][1].circle
+    name = f"{circle.name}, {_load(driven[0][0].cutting)}"
     degrees = np.append(np.arange(360), 0)
     outward = OUTWARD[degrees]
     axes = ["xyz"[i] for i in circle.plane]
@@ -86,27 +80,27 @@ def _figure(gaps: Sequence[RadialGap], number: int) -> Figure:
     traces = [line(f"nominal circle, R {circle.radius:.4g} mm", [], [], 0)]
     traces[0]["line"] = {"color": INK, "dash": "solid", "width": 1.5}
     shifts: list[dict[str, list[float | None]]] = [{}]
-    largest = max(float(np.nanmax(np.abs(gap.before))) for gap in gaps)
+    largest = _largest(driven)
     ring = _round_up(largest)
     drawn: list[tuple[str, Floats, Json]] = [
         (f"ring at +{ring:g} µm", np.full(361, ring), {"color": INK, "dash": "dot", "width": 1})
     ]
-    explained = any(not np.array_equal(gap.before, gap.after) for gap in gaps)
+    explained = any(view.explained for view, _ in driven)
     for counter_clockwise in (True, False):
-        mine = [gap for gap in gaps if gap.turn.counter_clockwise == counter_clockwise]
+        mine = [(view, turn) for view, turn in driven if turn.counter_clockwise == counter_clockwise]
         if not mine:
             continue
         style = 0 if counter_clockwise else 1
         for what, faint in (("measured", False), ("with the causes found", True))[: 1 + explained]:
-            values = np.array([gap.after if faint else gap.before for gap in mine])
+            values = np.array([turn.radial(view.after if faint else view.before) for view, turn in mine])
             known = np.isfinite(values)
             mean = np.where(known.any(axis=0), np.nansum(values, axis=0) / np.maximum(known.sum(axis=0), 1), np.nan)
             more = {"color": f"var(--c{style + 1 + 2 * faint})", "dash": ("solid", "dash")[style], "width": 2}
-            drawn.append((f"{mine[0].turn.way}, {what}", mean[degrees], more))
+            drawn.append((f"{mine[0][1].way}, {what}", mean[degrees], more))
     for label, radial, style_of in drawn:
         traces.append(line(label, [], [], 0) | {"line": style_of})
         shifts.append({each: numbers(1e-3 * radial * outward[:, i], 6) for i, each in enumerate(axes)})
-    runs = ", ".join(dict.fromkeys(gap.run for gap in gaps))
+    runs = ", ".join(dict.fromkeys(view.name for view, _ in driven))
     words = f"up to {brief(largest)} µm"
     first = float(np.clip(250.0 * circle.radius / max(largest, 1e-3), 1.0, 1e5))
     return Figure(
