@@ -176,8 +176,8 @@ class Bench:
 
         An encoder moves it by the kinematics, a drive force by the spring that it loads, a dynamometer by the compliance.
         """
-        slopes, lever = self.slopes[k].at(self.runs[k].run_path.row_place), self.twin.nominal.tool
-        force = slopes.tip_wrench[:, :, :3] - np.cross(slopes.tip_wrench[:, :, 3:], lever)
+        slopes = self.slopes[k].at(self.runs[k].run_path.row_place)
+        force = per_force(slopes.tip_wrench, self.twin.nominal.tool)
         tip = np.broadcast_to(np.eye(3), force.shape)
         return np.concatenate([tip, slopes.tip_rho, slopes.tip_rho / self.springs, force], axis=2)
 
@@ -249,6 +249,11 @@ class Bench:
             back = np.einsum("nji,nj->ni", run.turn[:, 1:], gap[:, 1:3])
             gap[:, :3] = np.where(known[:, None], back, np.nan)
         return thinned(gap, run.thin)
+
+
+def per_force(slopes: Floats, tool: Floats) -> Floats:
+    """Slopes (n, c, 3) by a force on the tip of a tool (3,) mm, from slopes (n, c, 6) by the wrench at the platform."""
+    return np.asarray(slopes[:, :, :3] + np.cross(slopes[:, :, 3:], tool))
 
 
 def thinned(values: Floats, factor: int) -> Floats:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2
 
-from camcomp.diagnosis.fit.bench import Bench, Run, thinned
+from camcomp.diagnosis.fit.bench import Bench, Run, per_force, thinned
 from camcomp.diagnosis.fit.floor import NoiseFloor, row_scatter
 from camcomp.diagnosis.fit.outliers import tails
 from camcomp.diagnosis.fit.starts import unknown_starts
@@ -109,20 +109,12 @@ def _doubt(bench: Bench, k: int) -> Floats:
     out = np.zeros_like(bench.observed(k))
     if run.run_path.driven is None or not run.run_path.driven.doubt.any():
         return out
-    force = run.run_path.driven.doubt
-    m = len(bench.actuators)
-    slopes = bench.slopes[k].at(run.run_path.row_place)
-    lever = bench.twin.nominal.tool
+    force, m = run.run_path.driven.doubt, len(bench.actuators)
+    slopes, tool = bench.slopes[k].at(run.run_path.row_place), bench.twin.nominal.tool
     # each axis of the force may be off by itself
-    for axis in range(3):
-        push = np.zeros((len(force), 3))
-        push[:, axis] = force[:, axis]
-        wrench = np.concatenate([push, np.cross(lever, push)], axis=1)
-        tip = np.einsum("nij,nj->ni", slopes.tip_wrench, wrench) @ bench.twin.rotation
-        out[:, :3] = np.hypot(out[:, :3], bench.turned(k, tip))
-        out[:, 3 + m : 3 + 2 * m] = np.hypot(
-            out[:, 3 + m : 3 + 2 * m], np.einsum("nij,nj->ni", slopes.drive_wrench, wrench)
-        )
+    tips = np.moveaxis(per_force(slopes.tip_wrench, tool) * force[:, None], 2, 0) @ bench.twin.rotation
+    out[:, :3] = np.linalg.norm([bench.turned(k, each) for each in tips], axis=0)
+    out[:, 3 + m : 3 + 2 * m] = np.linalg.norm(per_force(slopes.drive_wrench, tool) * force[:, None], axis=2)
     out[:, 3 + 2 * m :] = force
     return np.abs(out)
 

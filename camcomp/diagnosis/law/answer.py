@@ -17,7 +17,7 @@ from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.result.types import Law
 from camcomp.diagnosis.search.unknown import firm_prior
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, temperature_of
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, parts_of, temperature_of
 from camcomp.diagnosis.statistics.evidence import FREE, Prior
 from camcomp.diagnosis.statistics.folds import Folds, Split, usual_split
 from camcomp.ground.datatypes import Floats
@@ -165,19 +165,8 @@ def with_law(problem: Problem, bench: TermBench, found: FoundLaw) -> Problem:
 
 
 def fit_needed(problem: Problem, members: Members) -> Fitted:
-    """The fit of the members that evidence supports and that are not small; a cause named without a law may have followed it."""
-    while members:
-        f = problem.refit(members)
-        smaller = [tuple(each for each in members if each != i) for i in members]
-        scale, prior = Scale(f.data, problem.prior, problem.candidates), problem.candidates.prior
-        temperature = temperature_of(f, problem.prior, problem.member_columns(f.members))
-        whole = scale(members)
-        odds = [(whole - scale(less)) / temperature + prior(members) - prior(less) for less in smaller]
-        small = problem.small_members(f)
-        if min(odds) < 0.0:
-            members = smaller[int(np.argmin(odds))]
-        elif small:
-            members = tuple(i for i in members if i not in small)
-        else:
-            return f
-    return problem.refit(())
+    """The most probable fit of all or some of the members, none of them small; a cause named without a law may have followed it."""
+    fits = [problem.refit(some) for some in parts_of(members)]
+    temperature = temperature_of(fits[0], problem.prior, problem.member_columns(members))
+    kept = [f for f in fits if not problem.small_members(f)]
+    return max(kept, key=lambda f: problem.candidates.value(f, temperature))
