@@ -14,7 +14,7 @@ from camcomp.diagnosis.answer.held_out import shrinkage_of
 from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
-from camcomp.diagnosis.fit.gap import floor_um, gap_sizes, main_channels, rest_by_actuator
+from camcomp.diagnosis.fit.gap import floor_um, gap_sizes, main_channels
 from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
 from camcomp.diagnosis.fit.open_problem import open_problem
@@ -197,7 +197,7 @@ def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer |
         )
     out.sort(key=lambda c: (-c.probability, -c.share))
     if found.unknown_in:
-        shares = rest_by_actuator(problem, best, found.unknown_in)
+        shares = places.actuators(_run_gaps(problem, causes), problem.bench.actuators)
         target = next((name for name, share in shares.items() if share > EVEN), None)
         out.append(
             UnknownCause(

@@ -4,7 +4,6 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.ground.datatypes import Floats
@@ -54,17 +53,3 @@ def floor_um(problem: Problem) -> float:
         return problem.floor.tip_um
     fast = problem.floor.fast[part]
     return 1e3 * float(np.sqrt(np.nansum(fast**2)))
-
-
-def rest_by_actuator(problem: Problem, f: Fitted, kind: str) -> dict[str, float]:
-    """Energy that a set leaves in one kind of channel by actuator, as shares; that of the tip read as motion of the carriages."""
-    if kind == "dyno":
-        return {}
-    bench, energy = problem.bench, np.zeros(len(problem.bench.actuators))
-    causes = problem.causes(f.members, f.theta, f.extra)
-    for k in range(len(bench.runs)):
-        rest = np.nan_to_num(bench.difference(k, bench.read(k, causes))[:, problem.channels_of(kind)])
-        if kind == "tip":
-            rest = np.einsum("nij,nj->ni", np.linalg.pinv(bench.thin_slopes[k]), rest)
-        energy += np.sum(rest**2, axis=0)
-    return places.shares(dict(zip(bench.actuators, energy.tolist(), strict=True)))

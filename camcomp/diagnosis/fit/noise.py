@@ -61,9 +61,7 @@ def inflation(bench: Bench) -> list[Floats]:
         t = run.run_path.time
         if run.run_path.ordered and len(t) > 4:
             change, between = _changes(run), rounding_noise(float(np.median(np.diff(t))))
-            place = run.run_path.place(t)
-            slope = np.abs(bench.twin.rotation.T @ place.of(bench.slopes[k].tip_rho))
-            m = len(bench.actuators)
+            slope, m = np.abs(bench.row_slopes[k]), len(bench.actuators)
             # a late drive stands behind by its speed, and a tip is read at one, that the rows lack
             of_drives = (TIMING_S**2 + late * between) * change
             extra[:, :3] = np.einsum("nij,nj->ni", slope, of_drives + run.run_path.between_s * between * change)
