@@ -114,7 +114,7 @@ def test_a_cause_that_followed_a_law_goes_once_it_is_known_and_another_stays(tmp
     forms = [f for f in at_tip(bench.sizes(spot)) if f.family == "settling" and "force_N" in f.about]
     white = bench.white(spot, bench.values(spot, forms[1]))
     law = SimpleNamespace(precision=np.full(2, 1.0), columns=(white,), terms=(Term(spot, forms[1]),))
-    f = fit_needed(with_law(problem, bench, law), (0, 1))
+    f = fit_needed(with_law(problem, law), (0, 1))
     assert f.members == (1,)
     (cause,) = problem.causes(f.members, f.theta, f.extra)
     assert cause.values["error_ppm"] == pytest.approx(300.0, abs=30.0)

@@ -85,7 +85,7 @@ def first_guess(bench: Bench, candidate: CandidateCause) -> dict[str, float] | N
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """k columns: candidate (k,) index of the candidate or -1, names (k,), prior, blocks per run (c n, k)."""
+    """k columns: candidate (k,) index of the candidate or -1, names (k,), prior, blocks per run (c n, k), without those of laws."""
 
     candidates: tuple[CandidateCause, ...]
     candidate: np.ndarray

@@ -54,8 +54,8 @@ class Problem:
 
     @cached_property
     def tip_gram(self) -> Floats:
-        """Products (k, k) of the columns' tip motion, mean over the rows of all runs, mm2."""
-        out = np.zeros((len(self.columns.names),) * 2)
+        """Products (k, k) of the tip motion of all columns but those of laws, mean over the rows of all runs, mm2."""
+        out = np.zeros((self.columns.blocks[0].width,) * 2)
         for k, (block, own) in enumerate(zip(self.columns.blocks, self.residuals, strict=True)):
             for first in range(0, len(own), ROWS_OF_PROCESS):
                 rows = slice(first, first + ROWS_OF_PROCESS)

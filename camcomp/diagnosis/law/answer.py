@@ -80,7 +80,7 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
     if best is None:
         return None
     found, own = best
-    joint = with_law(problem, bench, found)
+    joint = with_law(problem, found)
     fit = fit_needed(joint, f.members)
     if own is not None or fit.members:  # about the values that the causes have beside it
         own, found = fit, replace(found, folds=_base(problem, fit, bench, kind)(found.folds.split, False))
@@ -138,30 +138,18 @@ def rms_um(gaps: Sequence[Floats], signal: Sequence[Floats] = ()) -> float:
     return 1e3 * float(np.sqrt(np.mean(each))) if len(each) else 0.0
 
 
-def with_law(problem: Problem, bench: TermBench, found: FoundLaw) -> Problem:
+def with_law(problem: Problem, found: FoundLaw) -> Problem:
     """The problem with the terms of a law as further nuisances, with the prior of its coefficients."""
-    more, old = len(found.precision), problem.prior
+    more, old, columns = len(found.precision), problem.prior, problem.columns
     prior = Prior(
         np.concatenate([old.tolerance, found.precision**-0.5]),
         np.concatenate([old.sign, np.zeros(more)]),
         np.concatenate([old.reach, np.full(more, np.inf)]),
     )
-    values = [bench.values(t.spot, t.form) for t in found.terms]
-    blocks = tuple(
-        ByChannel.joined(
-            [block, *(bench.reached(t.spot, k, own[k]) for t, own in zip(found.terms, values, strict=True))]
-        )
-        for k, block in enumerate(problem.columns.blocks)
-    )
-    columns = replace(
-        problem.columns,
-        candidate=np.concatenate([problem.columns.candidate, np.full(more, -1)]),
-        names=(*problem.columns.names, *(f"law.{i}" for i in range(more))),
-        prior=prior,
-        blocks=blocks,
-    )
     white = [ByChannel.joined([W, *(x[k] for x in found.columns)]) for k, W in enumerate(problem.white)]
-    return replace(problem, columns=columns, white=white)
+    names = (*columns.names, *(f"law.{i}" for i in range(more)))
+    candidate = np.concatenate([columns.candidate, np.full(more, -1)])
+    return replace(problem, columns=replace(columns, candidate=candidate, names=names, prior=prior), white=white)
 
 
 def fit_needed(problem: Problem, members: Members) -> Fitted:
