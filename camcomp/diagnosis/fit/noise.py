@@ -1,6 +1,7 @@
 """The noise of a bench's channels: that of its instruments, and by how much single rows are less certain."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -43,9 +44,13 @@ def instrument_noise(bench: Bench, floor: NoiseFloor, least: Floats, times: Sequ
         sigma[k] = np.where(known, whole, np.nan)
         if bench.runs[k].run_path.ordered:
             slow[k], memory[k] = (lasting / whole) ** 2, np.exp(-step / REMEMBERED_S)
-    every = zip(inflation(bench), sigma, tails(bench), strict=True)
-    inflate = [np.sqrt(1.0 + (extra / own) ** 2) * heavy for extra, own, heavy in every]
-    return Noise(sigma, slow, memory, inflate, times)
+    return Noise(sigma, slow, memory, [], times)
+
+
+def with_doubt(noise: Noise, bench: Bench) -> Noise:
+    """The noise with by how much every row is less certain than its channel."""
+    every = zip(inflation(bench), noise.sigma, tails(bench), strict=True)
+    return replace(noise, inflate=[np.sqrt(1.0 + (extra / own) ** 2) * heavy for extra, own, heavy in every])
 
 
 def inflation(bench: Bench) -> list[Floats]:

@@ -18,7 +18,7 @@ from camcomp.diagnosis.fit.floor import least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, settled_interval
 from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, log_intervals, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
-from camcomp.diagnosis.fit.noise import instrument_noise
+from camcomp.diagnosis.fit.noise import instrument_noise, with_doubt
 from camcomp.diagnosis.fit.outliers import outlying
 from camcomp.diagnosis.fit.patterns import Dictionary, dictionary
 from camcomp.diagnosis.fit.problem import Problem
@@ -42,7 +42,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     floor = measure_floor(bench, stated_mm)
     times = [thinned(run.run_path.time, run.thin) for run in bench.runs]
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
-    noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
+    noise = with_doubt(instrument_noise(bench, floor, least_noise(bench, floor), times), bench)
     guessed = {i: guess for i, each in enumerate(candidates) if (guess := first_guess(bench, each)) is not None}
     columns = build(bench, candidates, guessed, floor.tip_um)
     shapes: dict[int, dict[str, float]] = {
