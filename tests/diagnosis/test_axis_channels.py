@@ -265,6 +265,55 @@ def test_a_joint_hung_otherwise_than_its_file_says_shows_its_stribeck_friction(t
         assert low <= true <= high and high - low < 0.3 * true
 
 
+def smooth_log(folder, name, seed, loop):
+    """A slide that moves by three sines, in each of which its loop has settled; loop: answer of the encoder to a frequency."""
+    rng, t = np.random.default_rng(seed), np.arange(0.0, 20.0, 0.005)
+    wanted, reached = np.zeros((2, len(t)), complex)
+    for size, frequency in ((40.0, 1.5), (10.0, 3.1), (3.0, 5.3)):
+        turning = size * np.exp(1j * (frequency * t + rng.uniform(0.0, 6.0)))
+        wanted, reached = wanted + turning, reached + loop(1j * frequency) * turning
+    encoder = reached.imag + rng.normal(0.0, 2e-4, len(t))
+    write(folder, name, {"t_s": t, "cmd_x_mm": wanted.imag, "act_x_mm": encoder})
+
+
+def test_a_loop_that_would_swing_shows_by_the_acceleration_alone(tmp_path):
+    """In moves that never make it ring."""
+    w = 2.0 * np.pi / 0.05
+    for name, seed in (("a", 1), ("b", 5)):
+        smooth_log(tmp_path, name, seed, lambda s: (w * s + w * w) / (s * s + w * s + w * w))
+    result = asked(tmp_path, [str(ROOT / "config/cartesian.yaml")], "ab", holdout=["b"])
+    (swings,) = result.causes
+    assert (result.verdict, swings.effect, swings.target) == ("identified", "servo_overshoot", "x")
+    low, high = swings.parameters["period_ms"].ci95
+    assert low <= 50.0 <= high and high - low < 5.0
+
+
+def test_an_encoder_ahead_by_the_acceleration_is_unknown(tmp_path):
+    """Too much force is fed forward, which no effect of the library does: the gap is several times the noise floor."""
+    smooth_log(tmp_path, "a", 1, lambda s: 1.0 + 6e-5 * s * s)
+    result = asked(tmp_path, [str(ROOT / "config/cartesian.yaml")], "a")
+    assert result.verdict == "unknown" and [c.effect for c in result.causes] == ["unknown"]
+    assert result.where.drivers[0].covariate == "acceleration:x"
+
+
+def test_a_loop_that_stays_behind_when_it_turns_round_is_unknown(tmp_path):
+    """Its friction shows in no drive force, for none is in the log; with one it is friction."""
+    smooth_log(tmp_path, "a", 1, lambda s: 1.0)
+    columns = np.genfromtxt(tmp_path / "a.csv", delimiter=",", names=True)
+    way = np.sign(np.gradient(columns["cmd_x_mm"]))
+    columns["act_x_mm"] -= 0.004 * way
+    logged = {name: columns[name] for name in columns.dtype.names}
+    write(tmp_path, "a", logged)
+    result = asked(tmp_path, [str(ROOT / "config/cartesian.yaml")], "a")
+    assert result.verdict == "unknown" and result.where.drivers[0].covariate == "reversal:x"
+    force = 40.0 * way + np.random.default_rng(3).normal(0.0, 0.5, len(way))
+    write(
+        tmp_path, "a", logged | {"act_x_N": force + 0.05 * np.gradient(np.gradient(columns["cmd_x_mm"], 0.005), 0.005)}
+    )
+    result = asked(tmp_path, [str(ROOT / "config/cartesian.yaml")], "a")
+    assert result.verdict == "identified" and [c.effect for c in result.causes] == ["friction"]
+
+
 def milling_log(folder, name, seed):
     """Moves of a slide with stops between them, every 10 ms; its friction goes with the speed, and so is gone at rest."""
     rng, step, rows = np.random.default_rng(seed), 1e-3, 40_000

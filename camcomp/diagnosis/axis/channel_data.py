@@ -13,6 +13,7 @@ from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.gate import within_a_row
 from camcomp.diagnosis.axis.row_noise import noise_after_fit
 from camcomp.diagnosis.axis.terms import AxisTravel
+from camcomp.diagnosis.model.noise import MINOR
 from camcomp.ground.datatypes import Bools, Floats
 
 LEAST = 1e-3  # of the largest column: below it bodies do not show
@@ -21,6 +22,9 @@ FORM = 0.2  # of the torque by which friction of a hinge is smaller while it tur
 CLOCK, TURNING = "clock", "turning"  # kinds: rows that are late; friction while it turns round, limited by its peak
 BETWEEN = "between rows"  # kind: motion between two rows, as far off as it may be
 BODIES = "bodies"  # kind: masses, first moments and inertias of the links behind a hinge, as a base of their columns
+ACCELERATION = "acceleration"  # kind: what the loop of a drive does, and inertia
+# kinds that may be unmodelled in a following error, and the covariate by which they are told
+BEYOND = {ACCELERATION: "acceleration", "friction": "reversal", "weight": "position"}
 Sizes = Mapping[str, Floats]  # kind -> columns (n, q)
 Response = Callable[[int, Sequence[tuple[AxisCause, Floats]]], Floats]  # run, causes that act -> values (n,)
 
@@ -39,9 +43,10 @@ class ChannelData:
     directions, which deflects the loop. unsure (n,) per run: uncertainty of rows in addition to the floor, 0 where it is not
     given; misfit: rms residual in floors, at least 1, to which it is added. between (n, 2) per run: uncertainty by the
     set-points between two rows, which no log holds. healthy: columns of the sizes that every axis has; inertia: those that
-    are force of inertia alone. covariates (n,) of the dictionary. response: what causes with their amplitudes (d,) add to the
-    channel of run k (n,). level: constant without a meaning. clock: standard deviation of the instants of rows against the
-    motion, s. scatter: of the encoders by which the axis moved, row by row.
+    are force of inertia alone; minor: kinds of healthy sizes that are no larger than on a healthy machine, while others may be as
+    large as the channel. covariates (n,) of the dictionary. response: what causes with their amplitudes (d,) add to the channel
+    of run k (n,). level: constant without a meaning. clock: standard deviation of the instants of rows against the motion, s.
+    scatter: of the encoders by which the axis moved, row by row.
     """
 
     channel: ChannelName
@@ -60,6 +65,7 @@ class ChannelData:
     between: Sequence[Floats] = ()
     healthy: Sequence[Sizes] = ()
     inertia: Sequence[Sizes] = ()
+    minor: frozenset[str] = frozenset()
     covariates: Sequence[Mapping[str, Floats]] = ()
     response: Response = no_response
     level: float = 0.0
@@ -111,7 +117,7 @@ class ChannelData:
         for kind in self.healthy[0]:
             own = np.concatenate([self.healthy[k][kind] for k in self.train])
             each = np.abs(own).max(axis=0) if kind == TURNING else np.sqrt(np.mean(own**2, axis=0))
-            most = HEALTHY_SHARE * max(size, self.floor)
+            most = MINOR * self.floor if kind in self.minor else HEALTHY_SHARE * max(size, self.floor)
             out[kind] = np.divide(most, each, out=np.zeros_like(each), where=each > 0.0)
             out[kind] = np.full(1, self.clock) if kind == CLOCK else out[kind]
             out[kind] = np.ones(own.shape[1]) if kind == BETWEEN else out[kind]

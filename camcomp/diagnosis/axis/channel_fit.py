@@ -10,12 +10,12 @@ Source: Swevers, Verdonck, De Schutter, IEEE Control Systems 27 (2007) 58; shrin
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.channel_data import ChannelData
+from camcomp.diagnosis.axis.channel_data import ACCELERATION, BEYOND, ChannelData
 from camcomp.diagnosis.axis.effect_columns import AxisCause
 from camcomp.diagnosis.axis.gate import KNOWN, LOCAL
 from camcomp.diagnosis.axis.linear_sets import (
@@ -36,7 +36,7 @@ from camcomp.diagnosis.axis.linear_sets import (
 )
 from camcomp.diagnosis.axis.row_noise import noise_after_fit
 from camcomp.diagnosis.model.calibration import calibration_of
-from camcomp.diagnosis.model.discrepancy import gains_of_more, smooth_functions
+from camcomp.diagnosis.model.discrepancy import gains_of_more, prior_of_covariate, smooth_functions
 from camcomp.diagnosis.model.imitation import probability_with_unmodelled
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.model.search import ROUNDS, sets_of_places
@@ -50,7 +50,8 @@ class ChannelFit:
 
     acting: the causes with their amplitudes. columns (n, k): of these and the healthy sizes, of the fitted runs. drivers: covariate of the dictionary that is more likely than not ->
     share of the residual's energy. hints: the same, where nothing but such functions makes rows of the residual alike.
-    imitated: probability of every cause where the residual shows something unmodelled.
+    imitated: probability of every cause where the residual shows something unmodelled. unmodelled: kinds of healthy sizes that
+    are larger than on healthy machines, with their share of the channel's energy, and the log odds that no cause does the same.
     """
 
     causes: tuple[FoundCause, ...]
@@ -62,6 +63,7 @@ class ChannelFit:
     drivers: Mapping[str, float]
     hints: Mapping[str, float]
     imitated: tuple[float, ...]
+    unmodelled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def combined(self, weights: Mapping[str, Sequence[float]]) -> Estimate:
         """A sum of healthy sizes, by kind, with its 95 % interval."""
@@ -73,8 +75,52 @@ class ChannelFit:
         return Estimate.stated(value, value - half, value + half)
 
 
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """The most probable set of causes under a prior of the healthy sizes; sd: deviation of a row that counts as one."""
+
+    data: ChannelData
+    terms: Sequence[AxisCause]
+    linear: LinearFit
+    sd: float
+
+    def log_evidence(self, sd: float) -> float:
+        """Log evidence of the set where it stands, with another deviation of a row."""
+        amount, members = by_term(self.linear.found.amplitudes()[0], self.terms), self.linear.found.members
+        return settled(self.data, self.terms, amount, on=members, sd=sd).found.log_evidence
+
+
 def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
-    """The most probable causes of a channel, their sizes and the residual."""
+    """The most probable causes of a channel, their sizes and the residual.
+
+    Healthy sizes of a following error that are larger than on healthy machines are unmodelled, as functions of a covariate are.
+    That of the acceleration is weighed against causes beside which it is not.
+    """
+    free = _most_probable(data, terms)
+    large = _large(free) if data.channel == "following" else {}
+    if ACCELERATION in large:
+        minor = _most_probable(replace(data, minor=frozenset({ACCELERATION})), terms)
+        sd = min(free.sd, minor.sd)
+        if free.log_evidence(sd) + prior_of_covariate(free.linear.model) < minor.log_evidence(sd):
+            free, large = minor, {kind: own for kind, own in _large(minor).items() if kind != ACCELERATION}
+    return replace(_answer(free), unmodelled=large)
+
+
+def _large(fit: _Fit) -> dict[str, tuple[float, float]]:
+    """Kinds of healthy sizes that are more than minor: share of the channel's energy, and log odds that they are."""
+    data, out = fit.data, {}
+    sizes = residuals(data, fit.terms, fit.linear)[2]
+    whole = float(np.mean(np.concatenate([data.values[k] for k in data.train]) ** 2))
+    for kind in (each for each in BEYOND if each in sizes):
+        square = float(np.mean(np.concatenate([data.healthy[k][kind] @ sizes[kind] for k in data.train]) ** 2))
+        if square > (MINOR * data.floor) ** 2:
+            minor = replace(fit, data=replace(data, minor=data.minor | {kind}))
+            gain = fit.log_evidence(fit.sd) - minor.log_evidence(fit.sd) + prior_of_covariate(fit.linear.model)
+            out |= {kind: (min(square / whole, 1.0), gain)} if gain > 0.0 else {}
+    return out
+
+
+def _most_probable(data: ChannelData, terms: Sequence[AxisCause]) -> _Fit:
     at = [np.zeros(len(t.parameters)) for t in terms]
     for again in range(PASSES + 1):
         responses = [joint_columns(data, terms, k, at) for k in range(len(data.values))]
@@ -94,13 +140,15 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     if data.channel == "following" and _excess(data, terms, linear) > LOCAL * data.floor**2:
         terms, linear, sd = _among_every_set(data, terms)
     terms, linear = _without_needless_parameters(data, terms, linear, sd)
-    terms, linear = _without_needless(data, terms, linear, sd)
-    return _answer(data, terms, linear, sd)
+    return _Fit(data, *_without_needless(data, terms, linear, sd), sd)
 
 
 def _excess(data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit) -> float:
-    """Mean square of what causes and healthy sizes leave of the fitted runs, each row over its noise."""
-    left = residuals(data, terms, linear, small=False)[0]
+    """Mean square of what causes and healthy sizes, but for those that are minor, leave of the fitted runs, each row over its
+    noise.
+    """
+    left, _, sizes = residuals(data, terms, linear, small=False)
+    left = [y + sum(data.healthy[k][kind] @ sizes[kind] for kind in data.minor) for k, y in enumerate(left)]
     return float(np.mean(data.in_floors(dict(enumerate(left))) ** 2))
 
 
@@ -192,7 +240,8 @@ def _with_fewer_parameters(
     return list(out.values())
 
 
-def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit, sd: float) -> ChannelFit:
+def _answer(fit: _Fit) -> ChannelFit:
+    data, terms, linear, sd = fit.data, fit.terms, fit.linear, fit.sd
     found, model = linear.found, linear.model
     deviation = by_term(np.sqrt(np.diag(found.amplitudes()[1])), terms)
     at = model.posterior(found.background, found.data.slab(found.members))

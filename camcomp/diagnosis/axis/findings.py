@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -155,13 +155,16 @@ class ChannelRun:
 
 @dataclass(eq=False, kw_only=True)
 class AxisChannel:
-    """One channel of one axis: its runs, the fitted ones first, and its noise floor. columns (n, k): of what was fitted."""
+    """One channel of one axis: its runs, the fitted ones first, and its noise floor. columns (n, k): of what was fitted. unmodelled:
+    of its fit.
+    """
 
     runs: list[ChannelRun]
     floor: float
     stated: bool
     columns: Floats
     gate: AxisGate | None = None
+    unmodelled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def fitted(self) -> list[ChannelRun]:

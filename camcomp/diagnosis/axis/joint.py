@@ -17,7 +17,15 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.channel_data import BETWEEN, BODIES, TURNING, ChannelData, base_of, healthy_sizes
+from camcomp.diagnosis.axis.channel_data import (
+    ACCELERATION,
+    BETWEEN,
+    BODIES,
+    TURNING,
+    ChannelData,
+    base_of,
+    healthy_sizes,
+)
 from camcomp.diagnosis.axis.channel_fit import ChannelFit, fit_channel
 from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, DrivenAxis, candidates
@@ -87,6 +95,7 @@ def study_channel(found: AxisFindings, rows: ChannelData, around: AxisSurroundin
         found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
         if channel.gate.word == "above":
             found.unknown_in += sorted((done.drivers or done.hints).items(), key=lambda each: -each[1])
+    channel.unmodelled = done.unmodelled
     found.causes += done.causes
     found.imitated |= {c.effect: p for c, p in zip(done.causes, done.imitated, strict=False)}
     return channel
@@ -180,7 +189,7 @@ def _healthy(
             own["delay"] = m.speed[:, None]
             own |= {"compliance": forces[k][:, None]} if all(np.isfinite(each).all() for each in forces) else {}
         else:
-            own["acceleration"] = m.acceleration[:, None]
+            own[ACCELERATION] = m.acceleration[:, None]
         if rows.channel == "following" and hinge:
             own |= {"friction": np.tanh(m.speed / max(CREEP * rows.fastest, 1e-12))[:, None], "weight": weight}
         elif rows.channel == "following":
@@ -192,7 +201,7 @@ def _healthy(
             own["asymmetry"] = np.abs(m.speed)[:, None]
         if force:
             own[TURNING] = _turning(m, hinge)
-        moved = {kind: own[kind] for kind in own if kind == "acceleration"}
+        moved = {kind: own[kind] for kind in own if kind == ACCELERATION}
         if force and hinge:
             every, still = bodies[k]
             own[BODIES], moved[BODIES] = every @ base, (every - still) @ base

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.axis import answer
-from camcomp.diagnosis.axis.channel_data import ChannelData, base_of
+from camcomp.diagnosis.axis.channel_data import BEYOND, ChannelData, base_of
 from camcomp.diagnosis.axis.findings import ROWS, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.joint import study_channel
 from camcomp.diagnosis.axis.law import axis_law
@@ -257,7 +257,15 @@ def _study_second_encoder(found: AxisFindings, task: AxisTask) -> None:
 
 
 def _name_rest(found: AxisFindings) -> None:
-    """Time, where residuals above the floor depend on no covariate, or on the position by a ripple alone."""
+    """What a following error depends on that no cause does; time, where residuals above the floor depend on no covariate, or on
+    the position by a ripple alone.
+    """
+    rubs = any(c.effect == "friction" for c in found.causes)  # that deflects the loop, too
+    beyond = found.following.unmodelled if found.following else {}
+    for kind, (share, gain) in sorted(beyond.items(), key=lambda each: -each[1][0]):
+        if not (kind == "friction" and rubs):
+            found.unknown_in.append((f"{BEYOND[kind]}:{found.name}", share))
+            found.unknown_chance = min(found.unknown_chance, -gain / float(np.log(10.0)))
     if found.unknown_in:
         return
     for channel in found.channels:
