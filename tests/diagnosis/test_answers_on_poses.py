@@ -36,7 +36,7 @@ FEW = {
 }
 
 
-@pytest.mark.parametrize("seed", some(FEW, in_ci=(23001,)))
+@pytest.mark.parametrize("seed", some(FEW, in_ci=()))
 def test_a_few_things_that_are_wrong_with_an_arm(tmp_path, seed):
     _, row = judged(tmp_path, seed)
     assert row["honest"] and row["all"] and not row["false_cause"], FEW[seed]

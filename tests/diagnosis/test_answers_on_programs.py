@@ -28,6 +28,7 @@ def test_a_log_with_empty_set_points_of_a_machine_with_nothing_wrong(tmp_path):
     assert (result["verdict"], result["causes"]) == ("none", [])
 
 
+@pytest.mark.campaign
 def test_a_bending_tool_that_one_run_of_three_shows(tmp_path):
     """The other runs are in the air, where no force bends the tool."""
     result, row = judged(tmp_path, "serial", 11032)

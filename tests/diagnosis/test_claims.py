@@ -67,7 +67,9 @@ STUDIES = {
 }
 
 
-@pytest.mark.parametrize("study", STUDIES)
+@pytest.mark.parametrize(
+    "study", [pytest.param(k, marks=pytest.mark.campaign) if k == "slides" else k for k in STUDIES]
+)
 def test_claims_on_unseen_runs_are_those_of_residuals_and_of_the_written_file(tmp_path, study):
     config, rows_of, columns, sd = STUDIES[study]
     runs = [(f"r{k}", rows_of(k)) for k in range(3)]

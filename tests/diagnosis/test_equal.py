@@ -83,6 +83,7 @@ def test_an_encoder_tells_a_lag_from_a_late_clock_before_anything_is_measured(wo
     assert not any(("servo_lag", None) in group for group in there)
 
 
+@pytest.mark.campaign
 def test_rows_of_a_member_in_its_own_direction_are_what_another_one_has_to_fit(workshop):
     """A workpiece that is turned and shifted in its plane is no long tool; one that is lifted is."""
     problem = workshop.answer(LONG)[1].problem

@@ -11,6 +11,7 @@ from camcomp.diagnosis.search.unexplained import unexplained_of
 from tests.validation.recorded.experiment import Plan, make, write
 
 
+@pytest.mark.campaign
 def test_the_force_turns_when_the_drives_do_not_when_they_are_told_to(tmp_path):
     paths = ("circles-exact", "pocket-blended")
     some_10_ms = Plan(5, "single", (("servo_lag", None),), (60.0,), paths=paths, runs=3, rows=300, rapids=False)

@@ -98,6 +98,7 @@ def test_a_swing_in_time_is_told_by_how_many_turns_it_does_between_runs(tmp_path
     assert found.form.shape[0] == pytest.approx(swing["period_s"], rel=2e-3)
 
 
+@pytest.mark.campaign
 def test_a_cause_that_followed_a_law_goes_once_it_is_known_and_another_stays(tmp_path):
     made = Experiment("creep", "x", "router", 970024, 3.0, 100)
     pitch = Fault("screw_pitch", "y", {"error_ppm": 300.0})

@@ -90,6 +90,7 @@ def in_four_digits(formula):
     return re.sub(r"\d+\.\d{3,}", lambda number: f"{float(number[0]):.4g}", formula)
 
 
+@pytest.mark.campaign
 def test_the_law_stands_in_the_result(lathe):
     cause = lathe.result["causes"][-1]
     law = cause["law"]

@@ -144,6 +144,7 @@ def test_where_there_is_no_program_an_error_says_so():
         assert caught.value.rule == "CC608"
 
 
+@pytest.mark.campaign
 def test_the_command_warns_of_a_program_that_cuts(tmp_path):
     out = tmp_path / "next.nc"
     code, said = invoke(["diagnose", str(SAMPLE), "--next-program", str(out)])

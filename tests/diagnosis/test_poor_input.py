@@ -169,7 +169,9 @@ HONEST = {
 }
 
 
-@pytest.mark.parametrize("name", HONEST)
+@pytest.mark.parametrize(
+    "name", [pytest.param(k, marks=pytest.mark.campaign) if k == "no y of the tip" else k for k in HONEST]
+)
 def test_what_is_left_gets_an_honest_answer(spoilt, name):
     """The play sits behind the encoders: without a tip nobody can see it; with less of the tip nobody may name another cause alone."""
     code, said, result = ask(spoilt(HONEST[name]))

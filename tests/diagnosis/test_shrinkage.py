@@ -25,6 +25,7 @@ def test_steps_lead_from_the_gap_to_near_the_floor(workshop, plan):
     assert found["refitted"] == []
 
 
+@pytest.mark.campaign  # the same of poses is in the plain run
 def test_the_frame_of_another_clamping_is_refitted_on_the_held_out_run_and_named(workshop, tmp_path):
     path, made = workshop.made(PLAN)
     folder = tmp_path / "experiment"

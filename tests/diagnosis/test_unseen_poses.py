@@ -54,6 +54,7 @@ def test_a_clamping_of_its_own_has_its_frames_fitted_again():
     assert result.verdict == "identified" and len(result.shrinkage.refitted) == 2
 
 
+@pytest.mark.campaign
 def test_a_base_that_is_set_anew_for_every_few_poses_has_frames_of_its_own_each_time():
     result = answer([run(f"r{k}", k, f"at {k}", rows=8, off=longer(), base=k + 1) for k in range(6)])
     assert result.verdict == "identified" and [(c.effect, c.target) for c in result.causes] == [

@@ -65,6 +65,7 @@ def test_the_wheel_says_what_it_needs(built):
     assert "](" not in text and "<!--" not in text and "://" not in text  # nothing that an index would show broken
 
 
+@pytest.mark.campaign  # `.ci/versions` compensates with an installed one
 def test_an_installed_camcomp_needs_no_checkout(built, tmp_path):
     site, project = tmp_path / "site", tmp_path / "project"
     call(

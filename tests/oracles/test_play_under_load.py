@@ -112,6 +112,7 @@ def led(encoder, load, friction, width):
     return out
 
 
+@pytest.mark.campaign
 def test_a_slide_that_its_load_pushes_ahead_of_its_friction(tmp_path):
     """Guides hold 150 N, the load reaches 313 N: twice around the groove it pushes the carriage ahead of its drive."""
     plant, friction, width, y = MACHINES["orthoglide"], 150.0, 0.04, 1

@@ -109,6 +109,7 @@ def test_unseen_poses_at_angles_without_a_curve_are_told_apart(robot, runs):
     assert shrunk.covered_rms_um < 1.5 * FLOOR_UM < shrunk.after_rms_um
 
 
+@pytest.mark.campaign
 def test_one_campaign_does_not_identify_a_curve(robot, runs):
     result = arm_study(robot, (), runs[:1], stated=STATED)
     assert result.verdict == "ambiguous"
@@ -133,6 +134,7 @@ def test_a_joint_that_stops_short_is_found_from_the_way_in_which_it_came(robot):
     assert "joint_hysteresis" not in {c.effect for c in result.known}
 
 
+@pytest.mark.campaign
 def test_a_wrist_joint_that_is_dragged_along_is_found(robot):
     runs = [poses(n, k, r, lambda q: np.outer(4e-4 * q[:, 3], np.eye(6)[4])) for n, k, r in (("A", 5, A), ("B", 6, B))]
     result = arm_study(robot, (), runs, holdout=["B"], stated=STATED)

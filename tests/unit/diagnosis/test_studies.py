@@ -306,6 +306,7 @@ def test_the_resolution_of_an_encoder_is_noise():
     assert rows_floor([slow]) == pytest.approx(0.002 / np.sqrt(12.0))
 
 
+@pytest.mark.campaign
 def test_what_a_coarse_encoder_does_by_way_of_speed_and_acceleration_is_noise_too():
     log = axis_log(step=1e-3)
     nothing = np.full(len(log.time), np.nan)

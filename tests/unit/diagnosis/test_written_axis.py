@@ -69,6 +69,7 @@ def test_the_written_file_leaves_what_is_claimed(tmp_path, late):
     assert again.before_rms == pytest.approx(claim.after_rms, rel=0.03)
 
 
+@pytest.mark.campaign
 def test_friction_that_differs_between_directions_deflects_the_loop(tmp_path):
     """The drive force shows the asymmetry; without it, a following error of |speed| has no known cause."""
     config = str(ROOT / "config/cartesian.yaml")
