@@ -65,6 +65,10 @@ class Parameter:
             return value
         return float(np.log(value / self.nominal)) if self.log else value - self.nominal
 
+    def on_top(self, before: float, found: float) -> float:
+        """Value of what is found on top of a stated one: sum, product for factors; a shape is as it is found."""
+        return found if self.shape else self.value(self.coordinate(before) + self.coordinate(found))
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:

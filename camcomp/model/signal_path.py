@@ -90,6 +90,20 @@ def controlled(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Moti
     return encoder
 
 
+def on_top(causes: Sequence[Cause], stated: Sequence[Cause]) -> list[Cause]:
+    """Stated causes, changed where one of `causes` is the same effect at the same target or at all, and the other causes."""
+    out, new = [*stated], []
+    for cause in causes:
+        same = [i for i, own in enumerate(out) if own.name == cause.name and own.target in (cause.target, None)]
+        if not same:
+            new.append(cause)
+        for i in same:
+            records = {p.name: p for p in cause.effect.PARAMETERS}
+            changed = {n: records[n].on_top(v, cause.values[n]) for n, v in out[i].values.items() if n in records}
+            out[i] = replace(out[i], values={**cause.values, **changed})
+    return [*out, *new]
+
+
 def driven(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> tuple[Floats, Motion]:
     """Carriage minus encoder (n, m), and the motion with the nut behind screw and play, for effects of guides.
 

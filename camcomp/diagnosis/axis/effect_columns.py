@@ -137,8 +137,7 @@ class DrivenAxis:
         """Effect of causes on a channel (n,), in the study's mm or N: set-point - encoder, load - encoder, drive force."""
         names = (self.actuator.name,)
         if name == "following":
-            late = signal_path.controlled(causes, names, self.asked)
-            behind = self.lever * (self.asked.encoder - late)[:, 0]
+            behind = self.lever * (self.expected - self.followed(causes))[:, 0]
             return np.asarray(np.interp(self.run.time, self.asked.time, behind), float)
         error, guided = signal_path.driven(causes, names, self.moved)
         if name == "force":
@@ -147,16 +146,26 @@ class DrivenAxis:
         softer = sum(self._compliance(cause) - self._compliance(None) for cause in causes)
         return np.asarray(self.lever * (error[:, 0] - softer * self.weight), float)
 
+    @cached_property
+    def expected(self) -> Floats:
+        """Encoders (n, 1) by the machine file."""
+        return self.followed(())
+
+    def followed(self, causes: Sequence[Cause]) -> Floats:
+        """Encoders (n, 1) behind causes of the control, on top of those that the machine file states."""
+        every = signal_path.on_top(causes, self.run.stated)
+        return signal_path.controlled(every, (self.actuator.name,), self.asked)
+
     def known(self, causes: Sequence[Cause]) -> Bools:
         """Rows (n,) in which causes of the control do not depend on how the axis moved before its log began."""
         start = np.full((1, 1), self.run.encoder[0] / self.lever)
-        unsure = depends_on_start(causes, self.asked, start, np.full(1, self.lever))[:, 0]
+        every = signal_path.on_top(causes, self.run.stated)
+        unsure = depends_on_start(every, self.asked, start, np.full(1, self.lever))[:, 0]
         return np.asarray(np.interp(self.run.time, self.asked.time, unsure) == 0.0)
 
     def laws(self, texts: Sequence[str], causes: Sequence[Cause]) -> Floats:
         """Effect of formulas at the stage control, behind causes, on the following error (n, q), in the study's mm."""
-        late = signal_path.controlled(causes, (self.actuator.name,), self.asked)
-        rows = DriveRows(self.asked, 0, followed=late[:, 0])
+        rows = DriveRows(self.asked, 0, followed=self.followed(causes)[:, 0])
         added = [parse(text, AT_DRIVE)(rows, rows.rows) for text in texts]
         return -self.lever * np.stack([np.interp(self.run.time, self.asked.time, each) for each in added], axis=1)
 

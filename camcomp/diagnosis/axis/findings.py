@@ -15,6 +15,7 @@ from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.diagnosis.result.types import FoundCause, Law, LawPart
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Bools, Floats
+from camcomp.model.effect import Cause
 from camcomp.model.seams import missing_rows
 from camcomp.model.statics.arm import ARM_LENGTH
 
@@ -29,7 +30,8 @@ class AxisRun:
     row (n,): of the log, from 1. revolute: a hinge, whose
     way counts at the end of an arm of 1 m (`at_tip.lever_mm`), in mm and N like that of a slide. started: s, on the clock common to all runs.
     seen (n,): rows of which somebody saw how fast the axis was; all, where it is not given. course: times and set-points of the
-    whole log, (m,) each, of which these may be some rows. expected (n,): encoder minus set-point by the machine file's effects.
+    whole log, (m,) each, of which these may be some rows. expected (n,): encoder minus set-point by the machine file's effects of
+    the control, which are `stated`.
     load (n,): second encoder behind the gear, without what the machine file says of it; NaN where there is none.
     """
 
@@ -44,6 +46,7 @@ class AxisRun:
     seen: Bools | None = None
     course: tuple[Floats, Floats] | None = None
     expected: Floats | None = None
+    stated: Sequence[Cause] = ()
     load: Floats | None = None
 
     @property

@@ -38,7 +38,7 @@ def without_effects(
     if not servo or not np.isfinite(run.setpoint).all():
         return run
     late = axis.channel("following", servo)
-    return replace(run, expected=-late).of(axis.known(servo)) if late.any() else run
+    return replace(run, expected=-late, stated=servo).of(axis.known(servo)) if late.any() else run
 
 
 def _interpolated(log: Measured, run: AxisRun) -> Floats | None:

@@ -211,16 +211,15 @@ def _part(effects: CommentedSeq, at: int, actuators: Sequence[str]) -> None:
 
 
 def _change(entry: CommentedMap, cause: NamedEffect) -> None:
-    """Add an estimate to an entry: sum, product for factors; shape parameters take the estimate itself."""
+    """Add an estimate to an entry."""
     records = _records(cause.effect)
     for name, found in cause.parameters.items():
         low, high = found.ci95
         record = records.get(name)
         before = _plain(entry.get(name))
         value = found.value
-        if record is not None and not record.scan and not record.either and isinstance(before, int | float):
-            value = record.value(record.coordinate(float(before)) + record.coordinate(found.value))
-            value = float(f"{value:.6g}")
+        if record is not None and not record.shape and isinstance(before, int | float):
+            value = float(f"{record.on_top(float(before), found.value):.6g}")
         entry[name] = _number(record, value, found.ci95)
         entry.yaml_add_eol_comment(f"found on top: {found.value:g}, 95 %: {low:g} to {high:g}", name)
 
