@@ -108,7 +108,8 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
 
 def _large(fit: _Fit) -> dict[str, tuple[float, float]]:
     """Kinds of healthy sizes that are more than minor: share of the channel's energy, and log odds that they are."""
-    data, out = fit.data, {}
+    data = fit.data
+    out: dict[str, tuple[float, float]] = {}
     sizes = residuals(data, fit.terms, fit.linear)[2]
     whole = float(np.mean(np.concatenate([data.values[k] for k in data.train]) ** 2))
     for kind in (each for each in BEYOND if each in sizes):

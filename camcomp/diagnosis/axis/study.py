@@ -261,8 +261,8 @@ def _name_rest(found: AxisFindings) -> None:
     the position by a ripple alone.
     """
     rubs = any(c.effect == "friction" for c in found.causes)  # that deflects the loop, too
-    beyond = found.following.unmodelled if found.following else {}
-    for kind, (share, gain) in sorted(beyond.items(), key=lambda each: -each[1][0]):
+    large = found.following.unmodelled if found.following else {}
+    for kind, (share, gain) in sorted(large.items(), key=lambda each: -each[1][0]):
         if not (kind == "friction" and rubs):
             found.unknown_in.append((f"{BEYOND[kind]}:{found.name}", share))
             found.unknown_chance = min(found.unknown_chance, -gain / float(np.log(10.0)))
