@@ -44,7 +44,7 @@ class ChannelData:
     given; misfit: rms residual in floors, at least 1, to which it is added. between (n, 2) per run: uncertainty by the
     set-points between two rows, which no log holds. healthy: columns of the sizes that every axis has; inertia: those that
     are force of inertia alone; minor: kinds of healthy sizes that are no larger than on a healthy machine, while others may be as
-    large as the channel. covariates (n,) of the dictionary. response: what causes with their amplitudes (d,) add to the channel
+    large as the channel; between_s2: what the motion between two rows does by the acceleration. covariates (n,) of the dictionary. response: what causes with their amplitudes (d,) add to the channel
     of run k (n,). level: constant without a meaning. clock: standard deviation of the instants of rows against the motion, s.
     scatter: of the encoders by which the axis moved, row by row.
     """
@@ -66,6 +66,7 @@ class ChannelData:
     healthy: Sequence[Sizes] = ()
     inertia: Sequence[Sizes] = ()
     minor: frozenset[str] = frozenset()
+    between_s2: float = 0.0
     covariates: Sequence[Mapping[str, Floats]] = ()
     response: Response = no_response
     level: float = 0.0
@@ -109,6 +110,12 @@ class ChannelData:
         one = [{"offset": np.ones((len(each), 1))} for each in left]
         return replace(self, values=left, healthy=one, train=[run], level=0.0, clock=0.0)
 
+    def minor_size(self, kind: str) -> float:
+        """Effect (rms) on the fitted runs that sizes of a kind have on a healthy machine."""
+        rows = np.concatenate([self.healthy[k][kind] for k in self.train])
+        between = self.between_s2 * float(np.sqrt(np.mean(rows**2))) if kind == ACCELERATION else 0.0
+        return float(np.hypot(MINOR * self.floor, between))
+
     @property
     def scales(self) -> dict[str, Floats]:
         """Standard deviations (q,) of the amplitudes of healthy columns before the rows are seen, by kind."""
@@ -117,7 +124,7 @@ class ChannelData:
         for kind in self.healthy[0]:
             own = np.concatenate([self.healthy[k][kind] for k in self.train])
             each = np.abs(own).max(axis=0) if kind == TURNING else np.sqrt(np.mean(own**2, axis=0))
-            most = MINOR * self.floor if kind in self.minor else HEALTHY_SHARE * max(size, self.floor)
+            most = self.minor_size(kind) if kind in self.minor else HEALTHY_SHARE * max(size, self.floor)
             out[kind] = np.divide(most, each, out=np.zeros_like(each), where=each > 0.0)
             out[kind] = np.full(1, self.clock) if kind == CLOCK else out[kind]
             out[kind] = np.ones(own.shape[1]) if kind == BETWEEN else out[kind]

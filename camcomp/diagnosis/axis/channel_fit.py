@@ -94,14 +94,15 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     """The most probable causes of a channel, their sizes and the residual.
 
     Healthy sizes of a following error that are larger than on healthy machines are unmodelled, as functions of a covariate are.
-    That of the acceleration is weighed against causes beside which it is not.
+    That of the acceleration is weighed against causes beside which it is not; what is left below the floor is none.
     """
     free = _most_probable(data, terms)
     large = _large(free) if data.channel == "following" else {}
     if ACCELERATION in large:
         minor = _most_probable(replace(data, minor=frozenset({ACCELERATION})), terms)
         sd = min(free.sd, minor.sd)
-        if free.log_evidence(sd) + prior_of_covariate(free.linear.model) < minor.log_evidence(sd):
+        at_floor = _excess(minor.data, minor.terms, minor.linear) <= data.floor**2
+        if at_floor or free.log_evidence(sd) + prior_of_covariate(free.linear.model) < minor.log_evidence(sd):
             free, large = minor, {kind: own for kind, own in _large(minor).items() if kind != ACCELERATION}
     return replace(_answer(free), unmodelled=large)
 
@@ -114,7 +115,7 @@ def _large(fit: _Fit) -> dict[str, tuple[float, float]]:
     whole = float(np.mean(np.concatenate([data.values[k] for k in data.train]) ** 2))
     for kind in (each for each in BEYOND if each in sizes):
         square = float(np.mean(np.concatenate([data.healthy[k][kind] @ sizes[kind] for k in data.train]) ** 2))
-        if square > (MINOR * data.floor) ** 2:
+        if square > data.minor_size(kind) ** 2:
             minor = replace(fit, data=replace(data, minor=data.minor | {kind}))
             gain = fit.log_evidence(fit.sd) - minor.log_evidence(fit.sd) + prior_of_covariate(fit.linear.model)
             out |= {kind: (min(square / whole, 1.0), gain)} if gain > 0.0 else {}

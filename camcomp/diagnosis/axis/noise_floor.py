@@ -88,6 +88,19 @@ def instants_apart(values: Sequence[Floats], speeds: Sequence[Floats], floor: fl
     return float(np.sqrt((noise - floor**2) / np.median(speed[upper]))) if noise > sure * floor**2 else 0.0
 
 
+def _within_a_row(x: float) -> float:
+    """What a loop makes of a constant acceleration within a row, over its lateness squared; x: time between rows over that."""
+    return float(0.5 * (x - 2.0 + (x + 2.0) * np.exp(-x)))
+
+
+def by_acceleration_between_rows(time: Floats, late_s: float) -> float:
+    """Following error (s2) per acceleration that goes on, by the motion of set-points between rows at times (n,) s."""
+    if late_s <= 0.0 or len(time) < 2:
+        return 0.0
+    x = float(np.median(np.diff(time))) / late_s
+    return late_s**2 * _within_a_row(x) / float(-np.expm1(-x))
+
+
 def between_rows(time: Floats, setpoint: Floats, late_s: float) -> Floats:
     """Uncertainty (n, 2) mm of a following error by the motion of set-points between two rows, from the rows on either side.
 
@@ -99,7 +112,7 @@ def between_rows(time: Floats, setpoint: Floats, late_s: float) -> Floats:
     if late_s <= 0.0 or len(time) < 5:
         return np.zeros((len(time), 2))
     x = float(np.median(np.diff(time))) / late_s
-    share = (x - 2.0 + (x + 2.0) * np.exp(-x)) / (2.0 * x**2)
+    share = _within_a_row(x) / x**2
     quiet = float(np.quantile(np.abs(np.diff(setpoint, 4)), QUIET)) / float(norm.isf(0.5 - 0.5 * QUIET)) / np.sqrt(70.0)
     change = np.diff(setpoint, 3)
     change = np.sign(change) * np.maximum(np.abs(change) - 3.0 * np.sqrt(20.0) * quiet, 0.0)

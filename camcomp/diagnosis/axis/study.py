@@ -22,7 +22,13 @@ from camcomp.diagnosis.axis.joint import study_channel
 from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
 from camcomp.diagnosis.axis.next_moves import next_moves
-from camcomp.diagnosis.axis.noise_floor import between_rows, following_floor, instants_apart, rows_floor
+from camcomp.diagnosis.axis.noise_floor import (
+    between_rows,
+    by_acceleration_between_rows,
+    following_floor,
+    instants_apart,
+    rows_floor,
+)
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, travel
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
@@ -210,6 +216,7 @@ def _study_following(found: AxisFindings, task: AxisTask, asymmetric: bool) -> f
     rows = task.rows(
         moves, values, channel="following", floor=floor, stated=stated is not None, asymmetric=asymmetric, runs=every,
         whole=[(r.time, r.gap) for r in task.usable], unsure=unsure, between=unseen,
+        between_s2=by_acceleration_between_rows(every[train[0]].time, late),
     )  # fmt: skip
     found.following = study_channel(found, rows, task.around, task.without)
     return late

@@ -285,6 +285,7 @@ def test_rows_of_an_axis_tell_its_floor_and_an_experiment_may_state_it():
     assert result.floor.um == pytest.approx(np.hypot(0.5, 1.0), rel=0.05)  # noise, and 1 um of repeatability
     result = axis_study({"x": [axis_log()]}, stated=StatedDeviation(encoder_mm=5e-4, force_N=0.5))
     assert (result.verdict, result.floor.source, result.floor.um) == ("identified", "stated", 0.5)
+    assert {c.effect for c in result.causes} == {"servo_lag", "friction"}
     assert (
         axis_study({"x": [axis_log(step=1e-3)]}, stated=StatedDeviation(encoder_mm=5e-4, force_N=0.15)).verdict
         == "unknown"
