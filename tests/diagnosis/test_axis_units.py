@@ -70,6 +70,29 @@ def test_what_is_on_top_of_a_machine_file_changes_its_entry(tmp_path):
     assert entry["time_constant_ms"]["value"] == pytest.approx(8.0, rel=0.01)
 
 
+def test_a_loop_found_on_top_of_a_stated_one_is_one_loop(tmp_path):
+    """It swings with 50 ms where its file says 30: simulated step by step from rest, with noise that has heavy tails."""
+    rng, step = np.random.default_rng(2), 1e-3
+    t = np.arange(0.0, 20.0, step)
+    x = 40.0 * np.sin(1.5 * t) ** 3 + 3.0 * np.sin(5.3 * t) ** 3
+    place, speed, w, reached = 0.0, 0.0, 2.0 * np.pi / 0.05, np.empty_like(t)
+    for k, (wanted, fast) in enumerate(zip(x, np.gradient(x, step), strict=True)):
+        reached[k] = place
+        speed += step * (w * w * (wanted - place) + w * (fast - speed))
+        place += step * speed
+    rows = slice(None, None, 5)
+    encoder = reached[rows] + 2e-4 * rng.standard_t(3, len(t[rows]))
+    write(tmp_path, "a.csv", {"t_s": t[rows], "cmd_x_mm": x[rows], "act_x_mm": encoder})
+    stated = {"effects": [{"effect": "servo_overshoot", "target": "x", "period_ms": 30.0, "damping": 0.5}]}
+    (tmp_path / "swings.yaml").write_text(yaml.safe_dump(stated))
+    done = diagnose(experiment(tmp_path, [str(ROOT / "config/cartesian.yaml"), str(tmp_path / "swings.yaml")]))
+    assert (done.result.verdict, [c.effect for c in done.result.causes]) == ("identified", ["servo_overshoot"])
+    tree = YAML(typ="safe").load(done.machine_with_causes(str(tmp_path / "new.yaml")))
+    (entry,) = (each for each in tree["effects"] if each["effect"] == "servo_overshoot")
+    assert entry["period_ms"]["value"] == pytest.approx(50.0, rel=0.03)
+    assert entry["damping"]["value"] == pytest.approx(0.5, rel=0.2)
+
+
 def ripple(folder, name, frequency, seed):
     """J1 with 0.6 mrad sin(50 q) over 0.02 mrad of noise; J2 stands at 20 deg and J6 at 0, and the other joints are not logged."""
     t = np.arange(0, 10, 0.01)

@@ -44,9 +44,10 @@ class ChannelData:
     given; misfit: rms residual in floors, at least 1, to which it is added. between (n, 2) per run: uncertainty by the
     set-points between two rows, which no log holds. healthy: columns of the sizes that every axis has; inertia: those that
     are force of inertia alone; minor: kinds of healthy sizes that are no larger than on a healthy machine, while others may be as
-    large as the channel; between_s2: what the motion between two rows does by the acceleration. covariates (n,) of the dictionary. response: what causes with their amplitudes (d,) add to the channel
-    of run k (n,). level: constant without a meaning. clock: standard deviation of the instants of rows against the motion, s.
-    scatter: of the encoders by which the axis moved, row by row.
+    large as the channel; between_s2: following error per acceleration by the motion between two rows. covariates (n,) of the
+    dictionary. response: what causes with their amplitudes (d,) add to the channel of run k (n,). level: constant without a
+    meaning. clock: standard deviation of the instants of rows against the motion, s. scatter: of the encoders by which the axis
+    moved, row by row.
     """
 
     channel: ChannelName

@@ -48,8 +48,9 @@ from camcomp.ground.datatypes import Floats
 class ChannelFit:
     """The model of a channel: causes, healthy sizes by kind with their covariance, and residuals per run.
 
-    acting: the causes with their amplitudes. columns (n, k): of these and the healthy sizes, of the fitted runs. drivers: covariate of the dictionary that is more likely than not ->
-    share of the residual's energy. hints: the same, where nothing but such functions makes rows of the residual alike.
+    acting: the causes with their amplitudes. columns (n, k): of these and the healthy sizes, of the fitted runs. drivers:
+    covariate of the dictionary that is more likely than not -> share of the residual's energy. hints: the same, where nothing
+    but such functions makes rows of the residual alike.
     imitated: probability of every cause where the residual shows something unmodelled. unmodelled: kinds of healthy sizes that
     are larger than on healthy machines, with their share of the channel's energy, and the log odds that no cause does the same.
     """

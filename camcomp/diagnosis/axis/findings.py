@@ -158,8 +158,9 @@ class ChannelRun:
 
 @dataclass(eq=False, kw_only=True)
 class AxisChannel:
-    """One channel of one axis: its runs, the fitted ones first, and its noise floor. columns (n, k): of what was fitted. unmodelled:
-    of its fit.
+    """One channel of one axis: its runs, the fitted ones first, and its noise floor. columns (n, k): of what was fitted.
+
+    unmodelled: as its fit tells it (`ChannelFit`).
     """
 
     runs: list[ChannelRun]

@@ -88,8 +88,8 @@ def instants_apart(values: Sequence[Floats], speeds: Sequence[Floats], floor: fl
     return float(np.sqrt((noise - floor**2) / np.median(speed[upper]))) if noise > sure * floor**2 else 0.0
 
 
-def _within_a_row(x: float) -> float:
-    """What a loop makes of a constant acceleration within a row, over its lateness squared; x: time between rows over that."""
+def _of_steady_acceleration(x: float) -> float:
+    """What a loop makes, within a row, of an acceleration that goes on, over its lateness squared; x: rows' distance in time over it."""
     return float(0.5 * (x - 2.0 + (x + 2.0) * np.exp(-x)))
 
 
@@ -98,7 +98,7 @@ def by_acceleration_between_rows(time: Floats, late_s: float) -> float:
     if late_s <= 0.0 or len(time) < 2:
         return 0.0
     x = float(np.median(np.diff(time))) / late_s
-    return late_s**2 * _within_a_row(x) / float(-np.expm1(-x))
+    return late_s**2 * _of_steady_acceleration(x) / float(-np.expm1(-x))
 
 
 def between_rows(time: Floats, setpoint: Floats, late_s: float) -> Floats:
@@ -112,7 +112,7 @@ def between_rows(time: Floats, setpoint: Floats, late_s: float) -> Floats:
     if late_s <= 0.0 or len(time) < 5:
         return np.zeros((len(time), 2))
     x = float(np.median(np.diff(time))) / late_s
-    share = _within_a_row(x) / x**2
+    share = _of_steady_acceleration(x) / x**2
     quiet = float(np.quantile(np.abs(np.diff(setpoint, 4)), QUIET)) / float(norm.isf(0.5 - 0.5 * QUIET)) / np.sqrt(70.0)
     change = np.diff(setpoint, 3)
     change = np.sign(change) * np.maximum(np.abs(change) - 3.0 * np.sqrt(20.0) * quiet, 0.0)

@@ -34,10 +34,10 @@ CASES = {  # name: what is laid over the machine file, program, words of a warni
 }  # fmt: skip
 
 
-LONG = "step-over in inches"  # walks over metres
+SLOW = "step-over in inches"  # walks over metres
 
 
-@pytest.mark.parametrize("name", [pytest.param(k, marks=pytest.mark.campaign) if k == LONG else k for k in CASES])
+@pytest.mark.parametrize("name", [pytest.param(k, marks=pytest.mark.campaign) if k == SLOW else k for k in CASES])
 def test_warnings_figures_and_exit_code(tmp_path, monkeypatch, name):
     more, text, words = CASES[name]
     over, program = tmp_path / "over.yaml", tmp_path / "p.nc"
