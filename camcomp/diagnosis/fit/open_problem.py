@@ -86,7 +86,10 @@ def cause_prior(columns: Columns) -> CausePrior:
         a, b = candidates[i], candidates[j]
         return a.name == b.name and (a.target is None or b.target is None)
 
-    return CausePrior(tuple(tuple(columns.of(i)) for i in range(len(candidates))), np.array(weight), exclusive)
+    kinds = [tuple(i for i, a in enumerate(candidates) if a.name == name and a.target is not None) for name in names]
+    return CausePrior(
+        tuple(tuple(columns.of(i)) for i in range(len(candidates))), np.array(weight), exclusive, tuple(kinds)
+    )
 
 
 def _with_model_error(problem: Problem) -> Noise:

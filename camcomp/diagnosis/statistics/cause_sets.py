@@ -7,23 +7,24 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
-from math import factorial, log
+from math import comb, factorial
 
 import numpy as np
-from scipy.special import logsumexp
 
 from camcomp.diagnosis.statistics.evidence import (
     Prior,
     base,
     holding_back,
     log_bayes,
+    log_sum,
     misfit,
 )
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
-from camcomp.diagnosis.statistics.probability import TEMPERATURE
+from camcomp.diagnosis.statistics.probability import EVEN, TEMPERATURE
 from camcomp.ground.datatypes import Floats
 
 Members = tuple[int, ...]
+PATTERN = 3  # targets of one effect from which on they may have one origin: springs of several joints are one thing that gives way
 ALL_PARTS = 3  # members up to which every part of a set is looked at; of larger ones all but one, each alone, and none
 SIZES = (0.45, 0.33, 0.13, 0.055, 0.022, 0.009, 0.004)  # prior probability of 0, 1, 2 ... causes
 
@@ -66,15 +67,47 @@ class CausePrior:
     columns: tuple[tuple[int, ...], ...]
     weight: Floats
     exclusive: Callable[[int, int], bool]  # whether two candidates make no sense together
+    kinds: tuple[tuple[int, ...], ...] = ()  # candidates that are one effect at several targets, with equal weights
+    _priors: dict[tuple[Members, Members], float] = field(default_factory=dict, init=False, repr=False)
 
     def prior(self, members: Members, minor: Members = ()) -> float:
-        """Log prior probability of a set with its minor effects, drawn one after the other in any order."""
-        every = (*members, *minor)
-        return log(SIZES[len(every)] * factorial(len(every))) + sum(float(self.weight[i]) for i in every)
+        """Log prior probability of a set with its minor effects; cached."""
+        if (members, minor) not in self._priors:
+            self._priors[members, minor] = log_sum([odds for odds, _ in self.ways(members, minor)])
+        return self._priors[members, minor]
 
     def value(self, f: Fitted, temperature: float = 1.0) -> float:
         """Tempered log evidence of a set with its minor effects, plus their log prior."""
         return f.log_evidence / temperature + self.prior(f.members, f.minor)
+
+    def ways(self, members: Members, minor: Members = ()) -> list[tuple[float, list[Members]]]:
+        """How a set may have come about: the log prior probability of each way, and members that are of one size in it.
+
+        One by one, each of a size of its own; or one effect at several targets is one cause, by whatever all of these have
+        in common. Minor ones have no part in common with them: three of a kind are one thing, two and a minor one are not.
+        """
+        one_by_one: list[Members] = [(i,) for i in (*members, *minor)]
+        ways = [(_in_any_order([float(self.weight[i]) for (i,) in one_by_one]), one_by_one)]
+        if len(members) < PATTERN:
+            return ways
+        groups = [(tuple(i for i in members if i in kind), len(kind)) for kind in self.kinds]
+        groups = [(mine, of) for mine, of in groups if len(mine) >= PATTERN]
+        if not groups:
+            return ways
+        rest = [i for i in (*members, *minor) if not any(i in mine for mine, _ in groups)]
+        weights = [float(self.weight[i]) for i in rest]
+        for mine, of in groups:
+            more = 0.5 ** np.arange(of - PATTERN + 1)  # halving with every further target, and any so many of them
+            these = more[len(mine) - PATTERN] / more.sum() / comb(of, len(mine))
+            weights.append(float(self.weight[mine[0]]) + float(np.log(of * these)))
+        shared = len(groups) * float(np.log(EVEN)) + _in_any_order(weights)
+        return [*ways, (shared, [*(mine for mine, _ in groups), *((i,) for i in rest)])]
+
+
+def _in_any_order(weights: Sequence[float]) -> float:
+    """Log prior probability of causes of these log weights, drawn one after the other."""
+    d = len(weights)
+    return float(np.log(SIZES[d] * factorial(d))) + sum(weights)
 
 
 def parts_of(members: Members) -> list[Members]:
@@ -100,9 +133,14 @@ class Scale:
 
     def __call__(self, members: Members) -> float:
         """Log evidence of a set."""
-        causes = [self.candidates.columns[i] for i in members]
-        none = self.base.log_evidence - holding_back(self.base, self.prior, [c for own in causes for c in own])
-        return none + float(log_bayes(self.base, self.prior, [causes])[0])
+        columns = self.candidates.columns
+        none = self.base.log_evidence - holding_back(self.base, self.prior, [c for i in members for c in columns[i]])
+        if not members:
+            return none
+        ways = self.candidates.ways(members)
+        sets = [[[c for i in group for c in columns[i]] for group in groups] for _, groups in ways]
+        odds = np.array([each for each, _ in ways])
+        return none + log_sum(odds + log_bayes(self.base, self.prior, sets)) - log_sum(odds)
 
 
 def scored(scale: Scale, sets: Iterable[Members]) -> list[tuple[float, Members]]:
@@ -113,4 +151,5 @@ def scored(scale: Scale, sets: Iterable[Members]) -> list[tuple[float, Members]]
 def probabilities(fits: Sequence[Fitted], candidates: CausePrior, temperature: float = 1.0) -> Floats:
     """Posterior probability of every set among those fitted."""
     value = np.array([candidates.value(f, temperature) for f in fits])
-    return np.asarray(np.exp(value - logsumexp(value)))
+    out: Floats = np.exp(value - log_sum(value))
+    return out

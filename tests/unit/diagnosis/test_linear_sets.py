@@ -9,7 +9,7 @@ from camcomp.diagnosis.search.fitted_sets import LinearSets
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale, scored
 from camcomp.diagnosis.statistics.evidence import Prior, gram
 
-FORCE, WEIGHT, LENGTH, TWO = 4, 5, 6, 7
+SPRINGS, FORCE, WEIGHT, LENGTH, TWO = (0, 1, 2, 3), 4, 5, 6, 7
 COLUMNS = (*((i,) for i in range(7)), (7, 8))
 TRUTH = (0, 1, FORCE)
 
@@ -17,7 +17,7 @@ TRUTH = (0, 1, FORCE)
 def sets(D, r, excluded=2):
     """Sets of the columns D (n, 9) that explain r (n,); a candidate excludes that of two columns."""
     prior = Prior(np.full(9, 1e-3), np.zeros(9), np.full(9, np.inf))
-    known = CausePrior(COLUMNS, np.full(8, -np.log(8.0)), lambda i, j: {i, j} == {excluded, TWO})
+    known = CausePrior(COLUMNS, np.full(8, -np.log(8.0)), lambda i, j: {i, j} == {excluded, TWO}, (SPRINGS,))
     places = [PlacedCause(str(i), None, own) for i, own in enumerate(COLUMNS)]
     return LinearSets(Scale(gram(D, r), prior, known), range(8), places)
 

@@ -65,6 +65,28 @@ def test_a_member_that_stood_for_two_is_parted_beside_the_others():
     assert found_in(scale) == (0, 1, 4)
 
 
+def test_one_effect_at_three_targets_is_likelier_than_three_effects_and_at_two_it_is_not():
+    kinds = CausePrior(
+        *(getattr(candidates(12), name) for name in ("columns", "weight", "exclusive")), ((0, 1, 2, 3, 4, 5),)
+    )
+    assert kinds.prior((0, 1)) == candidates(12).prior((0, 1))
+    assert kinds.prior((0, 1, 6)) == candidates(12).prior((0, 1, 6))
+    assert kinds.prior((0, 1, 2)) > kinds.prior((6, 7, 8)) + 1.0
+    assert kinds.prior((0, 1, 2)) > kinds.prior((0, 1, 2, 3))
+
+
+def test_what_has_one_origin_is_of_one_size():
+    """Rows that two columns explain equally well: one at the size of its mates, or its twin at eight times that."""
+    rng = np.random.default_rng(7)
+    D = rng.standard_normal((400, 8))
+    D[:, 3] = D[:, 2] / 8.0
+    prior = Prior(np.full(8, 1e-3), np.zeros(8), np.full(8, np.inf))
+    data = gram(D, D[:, :3] @ np.full(3, 0.3) + rng.standard_normal(400))
+    kinds = CausePrior(*(getattr(candidates(8), name) for name in ("columns", "weight", "exclusive")), ((0, 1, 2, 3),))
+    apart, together = (Scale(data, prior, each) for each in (candidates(8), kinds))
+    assert together((0, 1, 2)) - together((0, 1, 3)) > apart((0, 1, 2)) - apart((0, 1, 3)) + 1.0
+
+
 def test_a_rival_is_another_set_that_is_neither_larger_nor_the_same_with_one_more_or_less():
     fits = [fitted(0), fitted(1), fitted(0, 1), fitted(1, 2), fitted()]
     assert rank(fits, np.full(5, 0.2) + [0.01, 0.0, 0.0, 0.0, 0.0], []).rivals == (1,)
@@ -96,6 +118,9 @@ def test_a_set_far_less_probable_is_a_rival_only_where_nothing_tells_it_apart():
 
 
 def test_a_minor_one_makes_no_set_likelier_before_the_data():
-    prior = candidates(8)
-    beside = prior.value(replace(fitted(0, 1), minor=(2,)))
-    assert beside == prior.prior((0, 1, 2)) and beside < prior.prior((0, 1))
+    """All targets of an effect are one thing that happens; two of them and a minor third are three."""
+    kinds = CausePrior(*(getattr(candidates(8), name) for name in ("columns", "weight", "exclusive")), ((0, 1, 2),))
+    assert kinds.prior((0, 1, 2)) > kinds.prior((0, 1))
+    beside = kinds.value(replace(fitted(0, 1), minor=(2,)))
+    assert beside < kinds.prior((0, 1))
+    assert beside == pytest.approx(kinds.value(replace(fitted(0, 3), minor=(2,))))  # no lead over what does the same
