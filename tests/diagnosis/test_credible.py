@@ -83,8 +83,14 @@ def test_a_bump_of_a_guide_is_no_wave_with_a_pitch(tmp_path):
     assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("unknown", ["unknown"])
 
 
-@pytest.mark.campaign
-@pytest.mark.parametrize("seed", [1744002, 1744005, 1744007], ids=["one arm", "another arm", "a third arm"])
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(1744002, id="one arm", marks=pytest.mark.campaign),
+        pytest.param(1744005, id="another arm"),
+        pytest.param(1744007, id="a third arm", marks=pytest.mark.campaign),
+    ],
+)
 def test_springs_some_per_cent_off_are_found_though_a_length_or_a_soft_tool_does_for_two_of_them(tmp_path, seed):
     """Two of them are exchanged for one at once; a set with a member that may be minor lowers the probability of others."""
     result, _ = answer(Plan(seed, "imperfect", imperfect=True, machine="kuka-kr210", **LONG), tmp_path)
