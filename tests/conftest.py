@@ -52,7 +52,7 @@ def sample_experiments_are_diagnosed_once():
 
     def diagnosed(experiment, *how):
         with pytest.MonkeyPatch.context() as patch:
-            if "samples/diagnosis" in Path(experiment).as_posix():
+            if "samples/diagnosis" in Path(experiment).resolve().as_posix():
                 patch.setattr(module, "diagnose", once)
             return whole(experiment, *how)
 

@@ -11,6 +11,7 @@ ROUTER = {"machine": "router", "runs": 3, "rows": 200, "stated": False}
 LONG = {"runs": 4, "rows": 300, "channels": "full", "sensors": Sensors(tip_mm=3e-3)}
 
 
+@pytest.mark.campaign  # test_unknown, test_found_laws and test_metamorphic have some in the plain run
 def test_three_causes_that_one_unknown_effect_does_as_well_are_not_named(tmp_path):
     """A rack's period on a short travel looks like a bow, a squareness and an offset together."""
     plan = Plan(901004, "unknown", (("rack_period", "y"),), (3.0,), **ROUTER)

@@ -7,22 +7,8 @@ import numpy as np
 import pytest
 
 from camcomp.api.diagnosis import diagnose
-from tests.diagnosis.test_loop import PAIR
 from tests.diagnosis.test_poor_input import PLAN
-from tests.diagnosis.test_where import SCREW
 from tests.validation.plants.further_run import add_run
-
-
-@pytest.mark.parametrize("plan", [SCREW, pytest.param(PAIR, marks=pytest.mark.campaign)])
-def test_steps_lead_from_the_gap_to_near_the_floor(workshop, plan):
-    result = workshop.answer(plan)[0]
-    found = result["shrinkage"]
-    sizes = [found["before_rms_um"], *(step["after_rms_um"] for step in found["steps"])]
-    assert len(found["steps"]) == len([c for c in result["causes"] if c["effect"] != "unknown"])
-    assert sizes == sorted(sizes, reverse=True) and sizes[-1] == found["after_rms_um"]
-    assert found["noise_floor_um"] == result["gap"]["noise_floor_um"]
-    assert found["after_rms_um"] < 1.8 * found["noise_floor_um"]
-    assert found["refitted"] == []
 
 
 @pytest.mark.campaign  # the same of poses is in the plain run

@@ -29,7 +29,7 @@ def test_what_differs_from_run_to_run_is_not_taken_for_something_that_lasts(work
 
 
 def test_a_known_cause_is_named_beside_an_unknown_one(workshop):
-    result = workshop.answer(plan_of(("drive_stiffness", "y"), ("clamp_slip", None), design="six", samples=150))[0]
+    result = workshop.answer(plan_of(("drive_stiffness", "y"), ("clamp_slip", None)))[0]
     assert result["verdict"] == "unknown"
     first = result["causes"][0]
     assert (first["effect"], first["target"]) == ("drive_stiffness", "y")
