@@ -90,16 +90,6 @@ def test_an_arm_that_is_its_model_has_no_cause(robot, healthy):
         assert result.gap.rms_um == pytest.approx(NOISE_UM, rel=0.1)
 
 
-@pytest.mark.campaign  # test_joint_curves has it in the plain run
-def test_one_campaign_identifies_nothing(robot, faulty):
-    for stated in (STATED, StatedDeviation()):
-        result = arm_study(robot, (), faulty[:1], stated=stated)
-        assert result.verdict == "ambiguous"
-        assert result.shrinkage is None
-        assert len(result.alternatives) > 1
-        assert "second campaign" in result.next_experiment.action
-
-
 @pytest.mark.campaign  # the sample of the UR10 has repeats, too
 def test_the_floor_is_what_repeats_show(robot, faulty):
     again = [replace(r, tip=r.tip + 0.0, time=r.time + 500.0) for r in faulty]
@@ -131,43 +121,6 @@ def test_what_the_library_lacks_is_unknown_and_named_by_what_it_depends_on(robot
     assert FAULTS <= known(result)
     assert result.where.drivers[0].covariate == "force:shoulder_lift"
     assert result.causes[-1].probability > 0.9  # the calibration map states no more
-
-
-@pytest.mark.campaign  # an axis is in the plain run
-def test_a_disturbance_for_a_while_is_located_in_time(robot, faulty):
-    runs = []
-    for r in faulty:
-        tip = r.tip.copy()
-        tip[100:140, 2] += 0.1
-        runs.append(replace(r, tip=tip))
-    result = arm_study(robot, (), runs, stated=STATED)
-    assert result.verdict == "unknown"
-    assert result.where.drivers[0].covariate == "time"
-    assert {i.run for i in result.where.intervals} == {"A", "B"}
-    assert all(i.t1_s > 90 and i.t0_s < 150 for i in result.where.intervals)
-
-
-@pytest.mark.campaign  # test_answers_on_poses has one in the plain run
-def test_beam_breaks_are_listed_and_not_fitted(robot, faulty):
-    rows = {"A": [17, 120], "B": [3, 200]}
-    runs = []
-    for r in faulty:
-        tip = r.tip.copy()
-        tip[rows[r.label]] += [30.0, -30.0, 15.0]
-        runs.append(replace(r, tip=tip))
-    result = arm_study(robot, (), runs, holdout=["B"], stated=STATED)
-    assert result.verdict == "identified"
-    assert known(result) == FAULTS
-    assert {(o.run, o.row) for o in result.outliers} == {(name, k + 1) for name, some in rows.items() for k in some}
-
-
-@pytest.mark.campaign  # beam breaks are in the plain run
-def test_heavy_tails_change_no_cause(robot, faulty):
-    rng = np.random.default_rng(8)
-    runs = [replace(r, tip=r.tip + 0.02 / np.sqrt(3) * rng.standard_t(3, r.tip.shape)) for r in faulty]
-    result = arm_study(robot, (), runs, holdout=["B"], stated=StatedDeviation(tip_mm=0.0283))
-    assert result.verdict in ("identified", "ambiguous")
-    assert known(result) == FAULTS
 
 
 @pytest.mark.campaign  # programs are in the plain run (tests/validation/recorded)
