@@ -49,7 +49,11 @@ def unexplained(problem: Problem, f: Fitted) -> dict[str, Unexplained]:
     for kind in KINDS:
         on = problem.channels_of(kind)
         ways = [thinned(problem.bench.at_tip(k)[:, :, on], run.thin) for k, run in enumerate(problem.bench.runs)]
-        at_tip = [np.einsum("nij,nj->ni", way, r[:, on]) for way, r in zip(ways, left, strict=True)]
+        at_tip = [
+            # across the path alone where the motion along it is unknown
+            r[:, on] if kind == "tip" else np.einsum("nij,nj->ni", way, r[:, on])
+            for way, r in zip(ways, left, strict=True)
+        ]
         if any(np.isfinite(a).any() for a in at_tip):
             out[kind] = unexplained_of(problem, kind, at_tip)
     return out
