@@ -45,6 +45,23 @@ def test_a_loop_that_rings_twice_as_much_as_what_is_left_of_its_drive_is_not_sur
     assert max([each["probability"] for each in result["causes"] if each["effect"] != "unknown"], default=0.0) <= 0.8
 
 
+def test_what_a_rack_does_is_no_clamping_that_is_off_for_sure(tmp_path):
+    """A turned workpiece explains a part of it that is no larger than what is left."""
+    plan = Plan(9100012, "unknown", (("screw_cyclic", "c"), ("rack_period", "y")), (9.0, 5.0), machine="delta", **LONG)
+    result, _ = answer(plan, tmp_path)
+    assert result["verdict"] == "unknown"
+    assert sum(each["probability"] for each in result["causes"] if each["effect"] == "workpiece_frame") < 0.5
+
+
+def test_play_that_only_the_way_across_the_path_shows_is_no_cause_that_returns_smoothly(tmp_path):
+    """Without set-points the way along the path is unknown; what is left across it counts all the same."""
+    plan = Plan(9000023, "unknown", (("joint_hysteresis", "z"),), (10.0,), machine="router", channels="tip",
+                runs=4, rows=300, sensors=Sensors(tip_mm=3e-3))  # fmt: skip
+    result, _ = answer(plan, tmp_path)
+    assert result["verdict"] == "unknown"
+    assert max([each["probability"] for each in result["causes"] if each["effect"] != "unknown"], default=0.0) < 0.9
+
+
 @pytest.mark.campaign
 def test_what_begins_at_two_drives_at_once_is_no_disturbance_of_either(tmp_path):
     """A clamping that slips moves the workpiece along both."""

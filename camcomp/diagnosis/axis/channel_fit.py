@@ -37,7 +37,7 @@ from camcomp.diagnosis.axis.linear_sets import (
 from camcomp.diagnosis.axis.row_noise import noise_after_fit
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import gains_of_more, prior_of_covariate, smooth_functions
-from camcomp.diagnosis.model.imitation import probability_with_unmodelled
+from camcomp.diagnosis.model.imitation import probability_with_unmodelled, products_across
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.model.search import ROUNDS, sets_of_places
 from camcomp.diagnosis.result.types import Estimate, FoundCause
@@ -303,9 +303,13 @@ def _no_imitation(
     found, term = linear.found, terms[i]
     others = tuple(j for j in found.members if j != i)
     alike = 1.0 if term.run else term.ways  # shapes of one cause, but windows, are imitated together
+    design = _design(linear, i)
+    functions = {
+        name: (gains.get(name, 0.0), products_across(effect, design, own, sd)) for name, own in _functions(data).items()
+    }
     return probability_with_unmodelled(
-        effect, _design(linear, i), {name: (gains.get(name, 0.0), own) for name, own in _functions(data).items()},
-        excess=float(np.sqrt(max(float(np.mean(left**2)) - data.floor**2, 0.0))), floor=data.floor, noise=sd,
+        float(np.sqrt(np.mean(effect**2))), functions, rows=len(effect),
+        excess=float(np.sqrt(max(float(np.mean(left**2)) - data.floor**2, 0.0))), floor=data.floor,
         odds=found.data.prior(found.members) - found.data.prior(others) + float(np.log(alike)),
     )  # fmt: skip
 

@@ -24,44 +24,52 @@ from camcomp.diagnosis.model.evidence import WIDTHS
 from camcomp.ground.datatypes import Floats
 
 
+def products_across(effect: Floats, others: Floats, functions: Floats, noise: float) -> Floats:
+    """Products (1 + q, 1 + q) of what columns leave of an effect and of functions.
+
+    Args:
+        effect: (n,) what a cause adds to a channel.
+        others: (n, k) columns of all else that was fitted, per standard deviation of their amplitudes before the data.
+        functions: (n, q) of one covariate.
+        noise: standard deviation of a row that counts as one of its own.
+    """
+    M = others.T @ others + noise**2 * np.eye(others.shape[1])
+    X = np.column_stack([effect, functions])
+    X = X - others @ np.linalg.solve(M, others.T @ X)
+    return np.asarray(X.T @ X)
+
+
 def probability_with_unmodelled(
-    effect: Floats,
-    others: Floats,
+    whole: float,
     functions: Mapping[str, tuple[float, Floats]],
     *,
+    rows: float,
     excess: float,
     floor: float,
-    noise: float,
     odds: float,
 ) -> float:
     """Probability of a cause jointly with an unmodelled effect.
 
     Args:
-        effect: (n,) what the cause adds to a channel.
-        others: (n, k) columns of all else that was fitted, per standard deviation of their amplitudes before the data.
-        functions: covariate -> log evidence that the unmodelled effect is a function of it, and these functions (n, q).
+        whole: rms of what the cause adds.
+        functions: covariate -> log evidence that the unmodelled effect is a function of it, and products (1 + q, 1 + q) of
+            what all else that was fitted leaves of the cause's effect and of these functions.
+        rows: number of rows of these products.
         excess: rms of the residual beyond its noise.
-        floor: noise of the channel, in which slabs are measured.
-        noise: standard deviation of a row that counts as one of its own.
+        floor: noise, in which slabs are measured.
         odds: log prior odds of the cause.
     """
-    M = others.T @ others + noise**2 * np.eye(others.shape[1])
-
-    def across(values: Floats) -> Floats:
-        return np.asarray(values - others @ np.linalg.solve(M, others.T @ values))
-
-    own = across(effect)
-    size, whole = (float(np.sqrt(np.mean(each**2))) for each in (own, effect))
-    if not (excess > 0.0 and size > 0.0):
-        return 1.0 if size > 0.0 else float(expit(odds))
-    e, slabs = own / np.linalg.norm(own), np.array(WIDTHS) * floor * size / whole
+    if not (excess > 0.0 and whole > 0.0):
+        return 1.0 if whole > 0.0 else float(expit(odds))
     without, with_cause, weight = [], [], []
-    for gain, B in functions.values():
-        B = across(B)
-        along = e @ B
-        spread = np.linalg.svd(B - np.outer(e, along), compute_uv=False) ** 2
-        if not spread.sum() > 0.0:
+    for gain, products in functions.values():
+        square = float(products[0, 0])
+        along = products[0, 1:] / np.sqrt(max(square, 1e-300))
+        spread = np.maximum(np.linalg.eigvalsh(products[1:, 1:] - np.outer(along, along)), 0.0)
+        if not (square > 0.0 and spread.sum() > 0.0):
             continue
+        size = float(np.sqrt(square / rows))
+        slabs = np.array(WIDTHS) * floor * size / whole
         scale = excess * max(float(np.sqrt(along @ along / spread.sum())), 1e-9)
         without.append(float(t.logpdf(size / scale, spread.sum() ** 2 / (spread**2).sum()) - np.log(scale)))
         with_cause.append(float(logsumexp(norm.logpdf(size, 0.0, np.hypot(slabs, scale))) - np.log(len(slabs))))

@@ -12,7 +12,7 @@ from camcomp.diagnosis.model.discrepancy import with_discrepancy
 from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.model.search import ROUNDS
 from camcomp.diagnosis.model.verdict import Word, decide
-from camcomp.diagnosis.search.credible import MODELLED, credibility
+from camcomp.diagnosis.search.credible import MODELLED, credibility, with_unmodelled
 from camcomp.diagnosis.search.fitted_sets import FittedSets
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
@@ -97,7 +97,8 @@ def search_causes(problem: Problem) -> CauseSearch:
     ranked, temperature = _rank_answers(problem, fitted)
     known, credible, beyond, kind = _keep_causes(problem, ranked.best, fitted)
     ranked = _with_answer(problem, ranked, known, temperature)
-    stated = _stated(ranked, credible, imitated=kind is not None or bool(above_floor(problem, beyond)))
+    credible, imitated = _weigh_imitations(problem, known, credible, beyond, kind)
+    stated = _stated(ranked, credible, imitated=imitated)
     left = residual_tests(problem, known, problem.prior if kind is None else firm_prior(problem))
     kind = kind if kind is None or kind in left else next(iter(left))
     return CauseSearch(
@@ -152,6 +153,18 @@ def _keep_causes(
     if kind is None and (at_first or instead):
         kind = worst(beyond).kind
     return f, present, beyond, kind
+
+
+def _weigh_imitations(
+    problem: Problem, f: Fitted, credible: Mapping[int, float], beyond: Mapping[str, Unexplained], kind: str | None
+) -> tuple[Mapping[int, float], bool]:
+    """Probabilities of members that something unmodelled may imitate, and whether withheld runs show any."""
+    above = above_floor(problem, beyond)
+    if kind is None and not above:
+        return credible, False
+    excess_um = max((each.excess_um for each in above), default=worst(beyond).excess_um)
+    jointly = with_unmodelled(problem, f, excess_um)
+    return {i: min(p, jointly[i]) for i, p in credible.items()}, True
 
 
 def _with_answer(problem: Problem, sets: RankedSets, known: Fitted, temperature: float) -> RankedSets:

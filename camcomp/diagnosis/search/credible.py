@@ -24,13 +24,14 @@ from scipy.special import logsumexp
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.discrepancy import UNKNOWN, gains_at_scales
+from camcomp.diagnosis.model.imitation import probability_with_unmodelled
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.search.unknown import joint_products, process_in_time
 from camcomp.diagnosis.statistics.cause_sets import Fitted, parts_of
 from camcomp.diagnosis.statistics.evidence import base, holding_back, log_bayes
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.diagnosis.statistics.probability import TEMPERATURE
-from camcomp.diagnosis.statistics.score_test import projected
+from camcomp.diagnosis.statistics.score_test import products_of_effect, projected
 from camcomp.ground.datatypes import Floats, Ints
 
 MODELLED = 0.1  # of what causes explain: none is modelled better than that
@@ -48,8 +49,7 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool) -> tuple[dict[int,
     joint, k = joint_products(problem, f, weight), len(problem.columns.names)
     data = NormalEquations(joint.A[:k, :k], joint.b[:k], joint.c, joint.rows)
     alone = _alone(problem, f, data, log(1.0 - UNKNOWN))
-    rows = sum(float((w**2).sum()) for w in weight)
-    kinds = [_with_covariates(problem, f, joint, alone, rows)]
+    kinds = [_with_covariates(problem, f, joint, alone, weight)]
     for power in (2.0, 1.0):
         scales = process_in_time(problem, f, weight, power)
         prior = log(UNKNOWN) - log(len(scales))
@@ -91,28 +91,63 @@ def _alone(problem: Problem, f: Fitted, data: NormalEquations, prior: float) -> 
 
 
 def _with_covariates(
-    problem: Problem, f: Fitted, joint: NormalEquations, alone: Sequence[_Hypothesis], rows: float
+    problem: Problem, f: Fitted, joint: NormalEquations, alone: Sequence[_Hypothesis], weight: Sequence[Floats]
 ) -> list[_Hypothesis]:
-    """Every part of a set jointly with functions of every covariate; rows: number of white rows, each with its squared weight."""
-    columns, theta, first, k = problem.candidates.columns, list[Floats](), 0, len(problem.columns.names)
-    energy = np.diag(joint.A)[k:]
-    groups = [g for g in covariates(problem.dictionary.labels) if energy[g].any()]
+    """Every part of a set jointly with functions of every covariate."""
+    columns, theta, k = problem.candidates.columns, _thetas(problem, f), len(problem.columns.names)
+    groups = _covariates_with_units(problem, joint, weight)
     prior = log(UNKNOWN / (1.0 - UNKNOWN)) - log(max(len(groups), 1))
-    for i in f.members:
-        theta.append(f.theta[first : (first := first + len(columns[i]))])
     out = []
     for some, own in zip(parts_of(f.members), alone, strict=True):
         P, h = projected(joint, problem.prior, problem.member_columns(some))
-        for g in groups:
-            # a scale is the rms of all rows, in units of the noise
-            unit = float(np.sqrt(rows / energy[g].sum()))
+        for g, unit in groups:
             gains, amount = gains_at_scales(P[np.ix_(g, g)], h[g], unit)
             there = tuple(
-                has or float(_is_alike(joint.A, [*columns[i], *(k + g)], each, amount))
-                for has, i, each in zip(own.there, f.members, theta, strict=True)
+                has or float(_is_alike(joint.A, [*columns[i], *(k + g)], theta[i], amount))
+                for has, i in zip(own.there, f.members, strict=True)
             )
             gain = float(logsumexp(gains)) - float(np.log(len(gains)))
             out.append(_Hypothesis(own.evidence + gain, own.prior + prior, there, unmodelled=True))
+    return out
+
+
+def _thetas(problem: Problem, f: Fitted) -> dict[int, Floats]:
+    """Coordinates of every member."""
+    ends = np.cumsum([len(problem.candidates.columns[i]) for i in f.members])[:-1]
+    return dict(zip(f.members, np.split(f.theta, ends), strict=True))
+
+
+def _covariates_with_units(
+    problem: Problem, joint: NormalEquations, weight: Sequence[Floats]
+) -> list[tuple[Ints, float]]:
+    """Patterns (q,) of every covariate that has any, and the scale at which their rms over all rows is that of the noise."""
+    energy = np.diag(joint.A)[len(problem.columns.names) :]
+    rows = sum(float((w**2).sum()) for w in weight)  # white ones, each with its squared weight
+    groups = [g for g in covariates(problem.dictionary.labels) if energy[g].any()]
+    return [(g, float(np.sqrt(rows / energy[g].sum()))) for g in groups]
+
+
+def with_unmodelled(problem: Problem, f: Fitted, excess_um: float) -> dict[int, float]:
+    """Of every member of f: its probability where an excess residual (um at the tip) is unmodelled for certain."""
+    if not f.members:
+        return {}
+    weight = _weights(problem)
+    joint = joint_products(problem, f, weight)
+    functions = dict[str, tuple[float, Ints]]()
+    P, h = projected(joint, problem.prior, problem.member_columns(f.members))
+    for n, (g, unit) in enumerate(_covariates_with_units(problem, joint, weight)):
+        gains = gains_at_scales(P[np.ix_(g, g)], h[g], unit)[0]
+        functions[str(n)] = float(logsumexp(gains)) - log(len(gains)), np.concatenate([[0], 1 + g])
+    out, columns = {}, problem.candidates.columns
+    for i, theta in _thetas(problem, f).items():
+        others, own, size = tuple(j for j in f.members if j != i), columns[i], problem.moved_um(f, (i,))
+        products = products_of_effect(joint, problem.prior, problem.member_columns(others), own, theta)
+        products *= size**2 / float(theta @ joint.A[np.ix_(own, own)] @ theta)  # as mean squares at the tip
+        odds = problem.candidates.prior(f.members) - problem.candidates.prior(others)
+        out[i] = probability_with_unmodelled(
+            size, {name: (gain, products[np.ix_(on, on)]) for name, (gain, on) in functions.items()},
+            rows=1.0, excess=excess_um, floor=problem.floor.tip_um, odds=odds,
+        )  # fmt: skip
     return out
 
 

@@ -30,6 +30,24 @@ def projected(joint: NormalEquations, prior: Prior, members: Sequence[int]) -> t
     return joint.A[k:, k:] - half[:, :-1].T @ half[:, :-1], joint.b[k:] - half[:, :-1].T @ half[:, -1]
 
 
+def products_of_effect(
+    joint: NormalEquations, prior: Prior, members: Sequence[int], own: Sequence[int], theta: Floats
+) -> Floats:
+    """Products (1 + p, 1 + p) of a cause with columns `own` at coordinates theta (d,), and of the patterns behind the columns of a
+    prior (k,), with the columns `members` free and all others within tolerance.
+    """
+    k = len(prior.tolerance)
+    of = np.zeros((len(joint.A), 1 + len(joint.A) - k))
+    of[own, 0], of[k:, 1:] = theta, np.eye(len(joint.A) - k)
+    moved = joint.A @ of
+    others = np.setdiff1d(np.arange(k), own)
+    M = joint.A[np.ix_(others, others)] + np.diag(estimate_precision(prior, members)[others])
+    size = 1.0 / np.sqrt(np.diag(M))
+    L = cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(others)), lower=True)
+    half = solve_triangular(L, size[:, None] * moved[others], lower=True)
+    return np.asarray(of.T @ moved - half.T @ half)
+
+
 def score_test(P: Floats, h: Floats, labels: Sequence[str], kinds: Sequence[str]) -> dict[str, Shares]:
     """Shares of the energy beyond chance of the patterns of every kind of channel, the kind with most of it first.
 

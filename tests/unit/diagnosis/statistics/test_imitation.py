@@ -4,7 +4,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from camcomp.diagnosis.model.discrepancy import smooth_functions
-from camcomp.diagnosis.model.imitation import probability_with_unmodelled
+from camcomp.diagnosis.model.imitation import probability_with_unmodelled, products_across
 
 FLOOR = 1.0
 
@@ -21,9 +21,9 @@ def drawn(rng, present, lag):
     A = np.column_stack([u, one[:, 0]])
     fitted = A @ np.linalg.lstsq(A, gap, rcond=None)[0]
     effect = A[:, :1] @ np.linalg.lstsq(A, gap, rcond=None)[0][:1]
-    functions = {"velocity": (0.0, smooth_functions(u, -1.0, 1.0))}
-    excess = float(np.std(gap - fitted))
-    return probability_with_unmodelled(effect, one, functions, excess=excess, floor=FLOOR, noise=FLOOR, odds=0.0)
+    functions = {"velocity": (0.0, products_across(effect, one, smooth_functions(u, -1.0, 1.0), FLOOR))}
+    excess, whole = float(np.std(gap - fitted)), float(np.sqrt(np.mean(effect**2)))
+    return probability_with_unmodelled(whole, functions, rows=len(u), excess=excess, floor=FLOOR, odds=0.0)
 
 
 def test_a_lag_that_explains_as_much_as_is_unmodelled_is_not_sure_and_a_large_one_is():
@@ -43,7 +43,5 @@ def test_stated_probabilities_come_true():
 
 
 def test_without_anything_unmodelled_a_cause_is_sure_and_without_an_effect_the_prior_stays():
-    one = np.ones((50, 1))
-    given = {"excess": 0.0, "floor": 1.0, "noise": 1.0, "odds": 0.0}
-    assert probability_with_unmodelled(one[:, 0], 0.0 * one, {}, **given) == 1.0
-    assert probability_with_unmodelled(0.0 * one[:, 0], one, {}, **given) == 0.5
+    assert probability_with_unmodelled(1.0, {}, rows=50, excess=0.0, floor=1.0, odds=0.0) == 1.0
+    assert probability_with_unmodelled(0.0, {}, rows=50, excess=0.0, floor=1.0, odds=0.0) == 0.5
