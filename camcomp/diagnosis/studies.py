@@ -21,7 +21,6 @@ from camcomp.diagnosis.arm.study import studied as study_arm
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.plausible import check_axes
-from camcomp.diagnosis.axis.predicted import without_effects
 from camcomp.diagnosis.axis.study import studied as study_axes
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.experiment.log_checks import check_clock
@@ -149,7 +148,7 @@ def checked_axes(opened: OpenedLogs) -> dict[str, list[AxisRun]]:
     axes = {a.name: [_axis(run, log, k, a.revolute) for run, log in runs] for k, a in enumerate(robot.actuators)}
     around, logs = AxisSurroundings(robot, axes), opened.logs
     axes = {
-        name: [without_effects(around, name, one, causes, log) for one, log in zip(own, logs, strict=True)]
+        name: [around.without_effects(name, one, causes, log) for one, log in zip(own, logs, strict=True)]
         for name, own in axes.items()
     }
     for i, (run, _) in enumerate(runs):

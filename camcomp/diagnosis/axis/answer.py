@@ -40,7 +40,7 @@ def unknown(axis: AxisFindings, whole: int) -> UnknownCause:
         parts = [share for _, share in axis.unknown_in] if channel is axis.channels[-1] else []
         if axis.ripple and channel is axis.force:
             parts.append(axis.ripple.share)
-        if channel.gate and channel.gate.word == "above":
+        if channel.gate.above:
             parts.append(max(1.0 - channel.floor**2 / max(left, 1e-300), 0.0))
         shares.append(max(parts, default=0.0) * left / max(first, 1e-300))
     probability = stated(probability_of_chance(axis.unknown_chance)) if axis.strange else EVEN
@@ -117,7 +117,7 @@ def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
 
 
 def _intervals(found: Sequence[AxisFindings]) -> tuple[IntervalShare, ...]:
-    every = [i for a in found for c in a.channels if c.gate is not None for i in c.gate.intervals]
+    every = [i for a in found for c in a.channels for i in c.gate.intervals]
     tidy = [
         i.model_copy(update={"t0_s": round(i.t0_s, 6), "t1_s": round(i.t1_s, 6), "share": round(i.share, 4)})
         for i in every

@@ -38,8 +38,8 @@ def no_response(run: int, acting: Sequence[tuple[AxisCause, Floats]]) -> Floats:
 class ChannelData:
     """Rows of one channel of an axis, per run: the log, how the axis moved in the rows that count, and their values (n,).
 
-    train, test: runs that are fitted, and that are judged only. numbers: of the runs in their experiment. floor: noise of the
-    channel. whole: times and values of every row. asymmetric: whether friction in the drive force differs between the
+    train, test: runs that are fitted, and that are judged only. floor: noise of the channel. whole: times and values of every row,
+    those that count where it is not given. asymmetric: whether friction in the drive force differs between the
     directions, which deflects the loop. unsure (n,) per run: uncertainty of rows in addition to the floor, 0 where it is not
     given; misfit: rms residual in floors, at least 1, to which it is added. between (n, 2) per run: uncertainty by the
     set-points between two rows, which no log holds. healthy: columns of the sizes that every axis has; inertia: those that
@@ -56,10 +56,9 @@ class ChannelData:
     values: Sequence[Floats]
     train: Sequence[int]
     test: Sequence[int]
-    numbers: Sequence[int]
     floor: float
     stated: bool
-    whole: Sequence[tuple[Floats, Floats]]
+    whole: Sequence[tuple[Floats, Floats]] = ()
     asymmetric: bool = False
     unsure: Sequence[Floats] = ()
     misfit: float = 1.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ class AxisRun:
             y = getattr(self, name)
             bad = spikes(y, least)
             if name == "encoder":  # while the axis moves it is the following error that shows them
-                bad |= spikes(kept["setpoint"] - y + (0.0 if self.expected is None else self.expected), least)
+                bad |= spikes(replace(self, setpoint=kept["setpoint"]).gap, least)
             good = np.isfinite(y) & ~bad
             kept[name] = np.where(bad, np.interp(self.time, self.time[good], y[good]), y) if bad.any() else y
             off |= bad
@@ -126,18 +126,16 @@ class AxisRun:
 
     def of(self, rows: Bools) -> AxisRun:
         """Some of the rows (n,)."""
-        time, setpoint, encoder, force = (x[rows] for x in (self.time, self.setpoint, self.encoder, self.force))
-        seen = self.clear[rows]
-        return replace(
-            self, time=time, setpoint=setpoint, encoder=encoder, force=force, row=self.numbers[rows], seen=seen,
-            course=self.asked, expected=None if self.expected is None else self.expected[rows],
-            load=None if self.load is None else self.load[rows],
-        )  # fmt: skip
+        whole = replace(self, row=self.numbers, seen=self.clear, course=self.asked)
+        columns: dict[str, Any] = {
+            f.name: x[rows] for f in fields(whole) if isinstance(x := getattr(whole, f.name), np.ndarray)
+        }
+        return replace(whole, **columns)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChannelRun:
-    """One run of a channel, in the rows that count (n,). number: of the run in its experiment.
+    """One run of a channel, in the rows that count (n,). number: of the run among those that the channel has.
 
     whole: times and values of every row. gap (n,): values without the constant of the fitted runs and, where the run is
     judged only, without its disturbance forces. left (n,): residual.
@@ -167,7 +165,7 @@ class AxisChannel:
     floor: float
     stated: bool
     columns: Floats
-    gate: AxisGate | None = None
+    gate: AxisGate
     unmodelled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
@@ -245,4 +243,4 @@ class AxisFindings:
     @property
     def strange(self) -> bool:
         """Whether the residual shows an unmodelled effect."""
-        return bool(self.ripple or self.unknown_in or any(c.gate and c.gate.word == "above" for c in self.channels))
+        return bool(self.ripple or self.unknown_in or any(c.gate.above for c in self.channels))

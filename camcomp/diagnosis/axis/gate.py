@@ -31,6 +31,11 @@ class AxisGate:
     chance: float
     intervals: tuple[IntervalShare, ...]
 
+    @property
+    def above(self) -> bool:
+        """Whether the residual exceeds its floor."""
+        return self.word == "above"
+
 
 def judge(left: Sequence[Floats], times: Sequence[Floats], floor: float, names: Sequence[str]) -> AxisGate:
     """Judge residuals (n,) mm or N at times (n,) s of runs with names against a floor."""

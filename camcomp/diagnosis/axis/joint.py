@@ -84,17 +84,15 @@ def study_channel(found: AxisFindings, rows: ChannelData, around: AxisSurroundin
     channel = _channel(data, done, sure)
     _tell(found, data, done)
     if not force and float(np.std(channel.rows)) <= rows.floor:  # there is no gap that causes would explain
-        channel.gate, channel.runs = AxisGate("at", 0.0, ()), [replace(r, left=r.gap) for r in channel.runs]
         found.laws = [] if following else found.laws
-        return channel
+        return replace(channel, gate=AxisGate("at", 0.0, ()), runs=[replace(r, left=r.gap) for r in channel.runs])
     if force and not rows.hinge:
         _find_ripple(found, channel)
-    if channel.gate is not None and channel.gate.word == "open" and done.drivers:
+    if channel.gate.word == "open" and done.drivers:
         channel.gate = replace(channel.gate, word="above")  # the size does not tell, a covariate does
-    if channel.gate is not None:
-        found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
-        if channel.gate.word == "above":
-            found.unknown_in += sorted((done.drivers or done.hints).items(), key=lambda each: -each[1])
+    found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
+    if channel.gate.above:
+        found.unknown_in += sorted((done.drivers or done.hints).items(), key=lambda each: -each[1])
     channel.unmodelled = done.unmodelled
     found.causes += done.causes
     found.imitated |= {c.effect: p for c, p in zip(done.causes, done.imitated, strict=False)}
@@ -326,18 +324,14 @@ def _channel(rows: ChannelData, done: ChannelFit, sure: Sequence[Bools]) -> Axis
     # noise is as large as it is seen to be at most
     floors = [(rows.noise(k), np.maximum(np.abs(done.left[k]) / rows.floor, 1.0)) for k in rows.train]
     spread = float(np.sqrt(np.mean(np.concatenate([np.minimum(*each) for each in floors]) ** 2)))
-    channel = AxisChannel(
-        runs=[
-            ChannelRun(
-                name=rows.runs[k].name, number=rows.numbers[k], fitted=k in rows.train, move=moves[k],
-                whole=rows.whole[k],
-                gap=values[k] - constant - (0.0 if k in rows.train else pushed[k]), left=done.left[k],
-            ).of(sure[k])
-            for k in (*rows.train, *rows.test)
-        ],
-        floor=rows.floor * spread, stated=rows.stated, columns=done.columns,
-    )  # fmt: skip
     order = [*rows.train, *rows.test]
+    runs = [
+        ChannelRun(
+            name=rows.runs[k].name, number=k, fitted=k in rows.train, move=moves[k], whole=rows.whole[k],
+            gap=values[k] - constant - (0.0 if k in rows.train else pushed[k]), left=done.left[k],
+        ).of(sure[k])
+        for k in order
+    ]  # fmt: skip
     left = [done.left[k] for k in order]
     if rows.channel == "force":  # beside what laws of friction and inertia are known to
         rise = shelf.load("effects", "disturbance").RISE_S
@@ -350,7 +344,6 @@ def _channel(rows: ChannelData, done: ChannelFit, sure: Sequence[Bools]) -> Axis
         ]
         known = [np.hypot(each, rising(pushed[k], moves[k].time, rise)) for k, each in zip(order, own, strict=True)]
         left = [each / np.hypot(1.0, by / rows.floor) for each, by in zip(left, known, strict=True)]
-    left = [each / rows.noise(k) for k, each in zip(order, left, strict=True)]
-    left = [each[sure[k]] for k, each in zip(order, left, strict=True)]
-    channel.gate = judge(left, [moves[k].time[sure[k]] for k in order], rows.floor, [rows.runs[k].name for k in order])
-    return channel
+    left = [(each / rows.noise(k))[sure[k]] for k, each in zip(order, left, strict=True)]
+    gate = judge(left, [r.move.time for r in runs], rows.floor, [r.name for r in runs])
+    return AxisChannel(runs=runs, floor=rows.floor * spread, stated=rows.stated, columns=done.columns, gate=gate)

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
@@ -30,7 +29,7 @@ from camcomp.diagnosis.axis.noise_floor import (
     rows_floor,
 )
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
-from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, travel
+from camcomp.diagnosis.axis.terms import WIDE, travel
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
 from camcomp.diagnosis.model.noise import REPEATABILITY_MM, StatedDeviation
 from camcomp.diagnosis.model.verdict import Word, decide
@@ -104,7 +103,7 @@ def _result(
         axes_in_detail={a.name: a.details for a in found}, standards=StandardValues(absent=(NO_TIPS,)),
     )  # fmt: skip
     forces = [a.force for a in found if a.strange and a.force is not None]
-    return within_floor(result, in_forces=any(c.gate is not None and c.gate.word == "above" for c in forces))
+    return within_floor(result, in_forces=any(c.gate.above for c in forces))
 
 
 def _every_axis(
@@ -128,7 +127,7 @@ def _verdict(found: Sequence[AxisFindings]) -> Word:
     causes = [c for a in found for c in a.causes]
     return decide(
         unknown=float(any(a.strange for a in found)), best=min((c.probability for c in causes), default=1.0),
-        causes=len(causes), confirmed=all(c.gate is not None and c.gate.word == "at" for a in found for c in a.channels),
+        causes=len(causes), confirmed=all(c.gate.word == "at" for a in found for c in a.channels),
     )  # fmt: skip
 
 
@@ -153,11 +152,6 @@ class AxisTask:
         every = [self.around.bodies(self.name, r, travel(r.time, r.encoder), WIDE[0])[0] for r in self.usable]
         base = base_of([every[k] for k in self.train])
         return [each @ base for each in every]
-
-    def rows(self, moves: list[AxisTravel], values: list[Floats], **of_channel: Any) -> ChannelData:
-        """Rows of a channel by its motion and values."""
-        every = {"numbers": range(len(self.usable)), "runs": self.usable, "train": self.train, "test": self.test}
-        return ChannelData(moves=moves, values=values, **{**every, **of_channel})
 
 
 def _axis(
@@ -213,10 +207,10 @@ def _study_following(found: AxisFindings, task: AxisTask, asymmetric: bool) -> f
     ]
     apart = instants_apart([values[k] for k in train], [moves[k].speed for k in train], floor)
     unsure = [np.hypot(np.abs(own).max(axis=1), apart * m.speed) for own, m in zip(unseen, moves, strict=True)]
-    rows = task.rows(
-        moves, values, channel="following", floor=floor, stated=stated is not None, asymmetric=asymmetric, runs=every,
-        whole=[(r.time, r.gap) for r in task.usable], unsure=unsure, between=unseen,
-        between_s2=by_acceleration_between_rows(every[train[0]].time, late),
+    rows = ChannelData(
+        channel="following", runs=every, moves=moves, values=values, train=train, test=task.test, floor=floor,
+        stated=stated is not None, whole=[(r.time, r.gap) for r in every], asymmetric=asymmetric, unsure=unsure,
+        between=unseen, between_s2=by_acceleration_between_rows(every[train[0]].time, late),
     )  # fmt: skip
     found.following = study_channel(found, rows, task.around, task.without)
     return late
@@ -224,25 +218,24 @@ def _study_following(found: AxisFindings, task: AxisTask, asymmetric: bool) -> f
 
 def _study_force(found: AxisFindings, task: AxisTask, late: float | None) -> None:
     """The drive force."""
-    if not task.train or not all(np.isfinite(task.usable[k].force).all() for k in task.train):
-        return
-    forces = [r.force for r in task.usable]
-    swings = any(
-        c.effect == "servo_overshoot" for c in found.causes
-    )  # set-points a while later are no motion of such a loop
-    followed = found.following.followed(task.usable) if found.following and swings else None
     every, train = task.usable, task.train
+    if not train or not all(np.isfinite(every[k].force).all() for k in train):
+        return
+    forces = [r.force for r in every]
+    # set-points a while later are no motion of such a loop
+    swings = any(c.effect == "servo_overshoot" for c in found.causes)
+    followed = found.following.followed(every) if found.following and swings else None
     runs, moves, values = motion_of(found, every, forces, train, late, followed=followed, bodies=task.bodies)
     on = [run.moved() for run in runs]
     moves = [m.of(rows) for m, rows in zip(moves, on, strict=True)]
     values = [own[rows] for own, rows in zip(values, on, strict=True)]
     stated = found.stated_N
-    floor = stated or rows_floor([runs[k].force for k in task.train])
-    whole = [(r.time, r.force) for r in task.usable]
-    scatter = rows_floor([every[k].encoder for k in train])
-    rows = task.rows(
-        moves, values, channel="force", floor=floor, stated=stated is not None, whole=whole, scatter=scatter
-    )
+    floor = stated or rows_floor([runs[k].force for k in train])
+    rows = ChannelData(
+        channel="force", runs=every, moves=moves, values=values, train=train, test=task.test, floor=floor,
+        stated=stated is not None, whole=[(r.time, r.force) for r in every],
+        scatter=rows_floor([every[k].encoder for k in train]),
+    )  # fmt: skip
     found.force = study_channel(found, rows, task.around, task.without)
 
 
@@ -256,9 +249,9 @@ def _study_second_encoder(found: AxisFindings, task: AxisTask) -> None:
     own = max(rows_floor([r.encoder, np.asarray(r.load)]) for r in runs)
     stated = found.stated_mm
     floor = stated or float(np.hypot(np.sqrt(2.0) * own, REPEATABILITY_MM))
-    rows = task.rows(
-        moves, values, channel="behind", floor=floor, stated=stated is not None, runs=runs, train=train, test=test,
-        numbers=every, whole=[],
+    rows = ChannelData(
+        channel="behind", runs=runs, moves=moves, values=values, train=train, test=test, floor=floor,
+        stated=stated is not None,
     )  # fmt: skip
     found.behind = study_channel(found, rows, task.around, task.without)
 
@@ -276,7 +269,7 @@ def _name_rest(found: AxisFindings) -> None:
     if found.unknown_in:
         return
     for channel in found.channels:
-        if channel.gate is not None and channel.gate.word == "above":
+        if channel.gate.above:
             stretches = sum(each.share for each in channel.gate.intervals)
             beyond = 0.0 if found.ripple else max(1.0 - channel.floor**2 / max(channel.squares[1], 1e-300), 0.0)
             if stretches or beyond:

@@ -1,4 +1,6 @@
-"""The machine around an axis: loads on its drive, columns of the bodies behind it, motion of other axes, and dx = J(q) e at the tip."""
+"""The machine around an axis: loads on its drive, columns of the bodies behind it, effects that its file states, motion of other
+axes, and dx = J(q) e at the tip.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +14,13 @@ from camcomp.diagnosis.axis.effect_columns import DrivenAxis
 from camcomp.diagnosis.axis.findings import ROWS, AxisRun
 from camcomp.diagnosis.axis.rigid_bodies import torque_columns
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
+from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground.datatypes import STANDARD_GRAVITY, Floats
+from camcomp.model import signal_path
+from camcomp.model.effect import Cause
 from camcomp.model.statics.arm import ARM_LENGTH, Arm, arm_of, end_pose, jacobian
 from camcomp.model.statics.description import Actuator, Robot
-from camcomp.model.statics.hanging import hang
+from camcomp.model.statics.hanging import hang, tool_wrench
 from camcomp.model.statics.masses import has_moved_mass, mass_loads
 
 POSES = 400  # of a run or a proposed motion that are worked out; between them all is straight
@@ -79,6 +84,29 @@ class AxisSurroundings:
         moving = torque_columns(arm.chain, at, q, speed, acceleration)
         resting = torque_columns(arm.chain, at, q, still, still)
         return np.column_stack([moving, weight]), np.column_stack([resting, weight])
+
+    def without_effects(self, name: str, run: AxisRun, causes: Sequence[Cause], log: Measured) -> AxisRun:
+        """A run of an axis minus effects of the machine file and, on an arm, minus the torque against a dynamometer.
+
+        Rows are left out as long as the following error depends on how the axis moved before the log began. log: of the run.
+        """
+        if len(run.time) < ROWS or not (causes or log.has("dyno")):
+            return run
+        warm = np.isfinite(log.temperature)
+        temperature = np.interp(run.time, log.time[warm], log.temperature[warm]) if warm.any() else None
+        axis = replace(self.driven(name, run), temperature=temperature)
+        force = run.force - axis.channel("force", causes)
+        if log.has("dyno") and self.robot is not None and arm_of(self.robot) is not None:
+            q = self.coordinates(run.name, run.time)
+            wrench = tool_wrench(self.robot, q, log.force()[run.numbers - 1])
+            against = hang(self.robot, q, wrench).drive - hang(self.robot, q).drive
+            force = force - against[:, self.index(name)] / axis.lever
+        run = replace(run, force=force, load=None if run.load is None else run.load - axis.channel("behind", causes))
+        servo = signal_path.acting(causes, "control")
+        if not servo or not np.isfinite(run.setpoint).all():
+            return run
+        late = axis.channel("following", servo)
+        return replace(run, expected=-late, stated=servo).of(axis.known(servo)) if late.any() else run
 
     def others(self, name: str, run: AxisRun, wide: int) -> dict[str, AxisTravel]:
         """How the other axes moved in the same run."""
