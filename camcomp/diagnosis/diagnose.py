@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.diagnosis.answer.held_out import shrinkage_of
-from camcomp.diagnosis.answer.nested import causes_without
+from camcomp.diagnosis.answer.held_out import causes_without, shrinkage_of
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import floor_um, gap_sizes, main_channels

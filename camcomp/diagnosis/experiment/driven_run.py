@@ -18,7 +18,7 @@ from camcomp.diagnosis.experiment.log_checks import (
     places,
 )
 from camcomp.diagnosis.experiment.logged import Logged
-from camcomp.diagnosis.fit.label_offsets import STEP_S
+from camcomp.diagnosis.fit.labels import STEP_S
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
 from camcomp.diagnosis.fit.starts import STANDING_MM_PER_S, STOOD_MM

@@ -17,7 +17,7 @@ from camcomp.diagnosis.experiment.log_checks import (
 )
 from camcomp.diagnosis.experiment.logged import Logged
 from camcomp.diagnosis.fit.bench import MOST_ROWS, Run
-from camcomp.diagnosis.fit.label_offsets import with_clocks
+from camcomp.diagnosis.fit.labels import with_clocks
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground.csv_table import CsvTable, TableRules, read_csv
 from camcomp.ground.datatypes import Floats

@@ -132,6 +132,13 @@ class Bench:
         """Names in order."""
         return self.twin.actuators
 
+    @cached_property
+    def parts(self) -> dict[str, slice]:
+        """The channels of every kind, in their order."""
+        m = len(self.actuators)
+        ends = np.cumsum([0, 3, m, m, 3]).tolist()
+        return dict(zip(("tip", "encoder", "drive", "dyno"), map(slice, ends, ends[1:]), strict=False))
+
     def read(self, k: int, causes: Sequence[Cause]) -> Reading:
         """Readings of run k with causes on top of the config."""
         return self._sense(k, causes, self.runs[k].encoders)
@@ -216,9 +223,13 @@ class Bench:
             out[self._out[k]] = np.nan
         return out
 
+    def off(self, k: int) -> Floats:
+        """Measured minus nominal model (n, c) in every row of run k."""
+        return self.observed(k) - self.channels(k, self.nominal[k])
+
     def residual(self, k: int) -> Floats:
         """Measured minus nominal model (n, c) in run k, thinned."""
-        return self.difference(k, self.nominal[k])
+        return thinned(self.off(k), self.runs[k].thin)
 
     def difference(self, k: int, reading: Reading) -> Floats:
         """Measured minus a reading (n, c) of run k, thinned."""

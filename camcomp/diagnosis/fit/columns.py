@@ -5,13 +5,13 @@ tolerance what every healthy machine has of it.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of, thinned
-from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
+from camcomp.diagnosis.fit.labels import CLOCK_JITTER_S, EFFECT_OF, apart, label_name, scatter
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.starts import Nuisance, start_columns
 from camcomp.diagnosis.model.noise import HEALTHY, MINOR, REPEATABILITY_MM
@@ -26,7 +26,6 @@ from camcomp.model.effect import Parameter, applies
 from camcomp.model.statics.description import Robot
 
 RUN_OFFSET_N = 0.3
-CLOCK_JITTER_S = 1e-5  # of a clock, and of its second
 MOST_HEALTHY = 0.3  # of an effect's typical size
 
 
@@ -236,3 +235,18 @@ def _by_label(found: list[Nuisance], bench: Bench, label: str, columns: Sequence
         for name, per_run in columns:
             masked = [f if mine == other else 0.0 * f for mine, f in zip(labels, per_run, strict=True)]
             found.append((label_name(label, other, name), np.inf, masked))
+
+
+def with_scatter(columns: Columns, bench: Bench, amplitude: Floats) -> Columns:
+    """The columns with the tolerance of labels set to the scatter of their offsets; amplitude (k,): of all columns."""
+    tolerance = columns.prior.tolerance.copy()
+    for label, effect in EFFECT_OF.items():
+        labels = [getattr(run, label) for run in bench.runs]
+        if len(set(labels)) < 2 or None in labels:  # they differ from what the runs without one share
+            continue
+        first = {each: next(run for run in bench.runs if getattr(run, label) == each) for each in apart(labels)}
+        for p in CandidateCause(effect, None, shelf.load("effects", effect)).parameters:
+            mine = [columns.names.index(label_name(label, each, p.name)) for each in first]
+            taken_up = np.array([run.run_path.clock_s if label == "clock" else 0.0 for run in first.values()])
+            tolerance[mine] = max(scatter(amplitude[mine] + taken_up / p.scale), p.tolerance / p.scale)
+    return replace(columns, prior=replace(columns.prior, tolerance=tolerance))

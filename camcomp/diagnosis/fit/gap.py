@@ -11,11 +11,8 @@ from camcomp.ground.datatypes import Floats
 
 def main_channels(problem: Problem) -> slice:
     """The channels in which the gap is stated: the tip, or else the encoders, or else the drive forces."""
-    m = len(problem.bench.actuators)
-    for part in (slice(0, 3), slice(3, 3 + m), slice(3 + m, 3 + 2 * m)):
-        if any(np.isfinite(r[:, part]).any() for r in problem.residuals):
-            return part
-    return slice(3 + 2 * m, 6 + 2 * m)
+    *others, last = problem.bench.parts.values()
+    return next((part for part in others if any(np.isfinite(r[:, part]).any() for r in problem.residuals)), last)
 
 
 def gap_sizes(problem: Problem, f: Fitted) -> Floats:

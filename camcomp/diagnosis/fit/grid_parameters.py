@@ -101,8 +101,7 @@ def quick_columns(bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapp
     Per run over its channels of n' rows each, thinned: those of every shape behind those of the one before.
     """
     causes = [cause_of(candidate, {**shape, p.name: p.scale}) for shape in shapes for p in candidate.parameters]
-    m, every = len(bench.actuators), np.arange(len(causes))
-    aimed, out = np.flatnonzero(causes[0].which(bench.actuators)), []
+    every, aimed, out = np.arange(len(causes)), np.flatnonzero(causes[0].which(bench.actuators)), []
     for k, run in enumerate(bench.runs):
         motion = bench.nominal[k].motion
         n = len(motion.time)
@@ -113,7 +112,7 @@ def quick_columns(bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapp
             force = signal_path.drive_forces([cause], bench.actuators, guided)
             if force is not None:
                 effort[:, i] = force[:, aimed].T
-        parts = [(every[:0], np.zeros((n // run.thin, 0)))] * (6 + 2 * m)
+        parts = [(every[:0], np.zeros((n // run.thin, 0)))] * bench.parts["dyno"].stop
         ways = [np.ascontiguousarray(bench.turned(k, bench.row_slopes[k][:, :, j]).T) for j in aimed]
         tip = np.zeros((3, n // run.thin, len(causes)))
         for each, way in zip(moved, ways, strict=True):
@@ -121,6 +120,6 @@ def quick_columns(bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapp
         parts[:3] = [(every, channel) for channel in tip]
         if force is not None:
             for j, each in zip(aimed, effort, strict=True):
-                parts[3 + m + j] = every, means(each.T, np.ones((1, n)), run.thin)[0]
+                parts[bench.parts["drive"].start + j] = every, means(each.T, np.ones((1, n)), run.thin)[0]
         out.append(ByChannel(len(causes), tuple(parts)))
     return out

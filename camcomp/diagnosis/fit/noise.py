@@ -66,11 +66,11 @@ def inflation(bench: Bench) -> list[Floats]:
         t = run.run_path.time
         if run.run_path.ordered and len(t) > 4:
             change, between = _changes(run), rounding_noise(float(np.median(np.diff(t))))
-            slope, m = np.abs(bench.row_slopes[k]), len(bench.actuators)
+            slope = np.abs(bench.row_slopes[k])
             # a late drive stands behind by its speed, and a tip is read at one, that the rows lack
             of_drives = (TIMING_S**2 + late * between) * change
             extra[:, :3] = np.einsum("nij,nj->ni", slope, of_drives + run.run_path.between_s * between * change)
-            extra[:, 3 : 3 + m] = of_drives
+            extra[:, bench.parts["encoder"]] = of_drives
             if unsteady > 0.0:
                 extra[:, :3] = np.hypot(extra[:, :3], unsteady * np.abs(_speed(bench, k)))
         extra = np.hypot(np.hypot(extra, _doubt(bench, k)), unknown_starts(bench, k))
@@ -91,18 +91,17 @@ def _changes(run: Run) -> Floats:
 
 def _late(bench: Bench) -> Floats:
     """Delay (m,), s, of the drives behind their set-points, by the encoders in fast rows; 0 where unknown."""
-    m = len(bench.actuators)
-    behind: list[list[Floats]] = [[] for _ in range(m)]
+    behind: list[list[Floats]] = [[] for _ in bench.actuators]
     for k, run in enumerate(bench.runs):
         path = run.run_path
         if not path.ordered or len(path.time) < 3:
             continue
-        gap = (bench.observed(k) - bench.channels(k, bench.nominal[k]))[:, 3 : 3 + m]
+        gap = bench.off(k)[:, bench.parts["encoder"]]
         speed = np.gradient(path.grid_rho, path.grid, axis=0)
-        for j in range(m):
+        for j, late in enumerate(behind):
             v = np.interp(path.time, path.grid, speed[:, j])
             fast = np.isfinite(gap[:, j]) & (np.abs(v) > float(np.mean(np.abs(v))))
-            behind[j].append(-gap[fast, j] / v[fast])
+            late.append(-gap[fast, j] / v[fast])
     return np.array([max(float(np.median(np.concatenate([*each, [0.0]]))), 0.0) for each in behind])
 
 
@@ -112,13 +111,13 @@ def _doubt(bench: Bench, k: int) -> Floats:
     out = np.zeros_like(bench.observed(k))
     if run.run_path.driven is None or not run.run_path.driven.doubt.any():
         return out
-    force, m = run.run_path.driven.doubt, len(bench.actuators)
+    force = run.run_path.driven.doubt
     slopes, tool = bench.slopes[k].at(run.run_path.row_place), bench.twin.nominal.tool
     # each axis of the force may be off by itself
     tips = np.moveaxis(per_force(slopes.tip_wrench, tool) * force[:, None], 2, 0) @ bench.twin.rotation
     out[:, :3] = np.linalg.norm([bench.turned(k, each) for each in tips], axis=0)
-    out[:, 3 + m : 3 + 2 * m] = np.linalg.norm(per_force(slopes.drive_wrench, tool) * force[:, None], axis=2)
-    out[:, 3 + 2 * m :] = force
+    out[:, bench.parts["drive"]] = np.linalg.norm(per_force(slopes.drive_wrench, tool) * force[:, None], axis=2)
+    out[:, bench.parts["dyno"]] = force
     return np.abs(out)
 
 
@@ -134,7 +133,7 @@ def jitter(bench: Bench) -> float:
         if not run.run_path.ordered or len(t) < 60:
             continue
         speed = np.abs(_speed(bench, k))
-        gap = (bench.observed(k) - bench.channels(k, bench.nominal[k]))[:, :3]
+        gap = bench.off(k)[:, :3]
         rough = np.diff(gap, 4, axis=0) ** 2 / 70.0
         for rows, v in zip(rough.T, speed[2:-2].T, strict=True):
             present = np.isfinite(rows)

@@ -13,11 +13,11 @@ from camcomp.diagnosis.fit.columns import (
     first_guess,
     healthy_size,
     shape_default,
+    with_scatter,
 )
 from camcomp.diagnosis.fit.floor import least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, settled_interval
 from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, log_intervals, never_ending
-from camcomp.diagnosis.fit.label_offsets import with_scatter
 from camcomp.diagnosis.fit.noise import instrument_noise, with_doubt
 from camcomp.diagnosis.fit.outliers import outlying
 from camcomp.diagnosis.fit.patterns import Dictionary, dictionary

@@ -25,7 +25,7 @@ def outlying(bench: Bench) -> list[Bools]:
     """Per run (n, c): cells that are no readings of the machine: beam breaks, dropped telegrams. They are listed and not fitted."""
     out = []
     for k, run in enumerate(bench.runs):
-        gap = bench.observed(k) - bench.channels(k, bench.nominal[k])
+        gap = bench.off(k)
         bad = np.zeros(gap.shape, bool)
         for c, x in enumerate(gap.T):
             known = np.flatnonzero(np.isfinite(x))
@@ -33,9 +33,8 @@ def outlying(bench: Bench) -> list[Bools]:
                 bad[known, c] = _jumping_off(x[known])
         if run.run_path.ordered:
             bad[:, :3] |= _sprung_off(gap[:, :3])[:, None]
-        m = len(bench.actuators)
         bad[_as_the_tip_says(bench, k, gap, bad)] = False
-        for part in (slice(0, 3), slice(3 + 2 * m, 6 + 2 * m)):  # one instrument, one telegram
+        for part in (bench.parts["tip"], bench.parts["dyno"]):  # one instrument, one telegram
             bad[:, part] = np.any(bad[:, part], axis=1, keepdims=True)
         out.append(bad)
     return out
@@ -85,7 +84,7 @@ def _as_the_tip_says(bench: Bench, k: int, gap: Floats, odd: Bools) -> Bools:
 
     gap (n, c): measured minus nominal. What is far behind in rapids is so for few rows.
     """
-    run, encoders = bench.runs[k], slice(3, 3 + len(bench.actuators))
+    run, encoders = bench.runs[k], bench.parts["encoder"]
     out = np.zeros(gap.shape, bool)
     if run.by == "setpoint" and run.encoders is not None and odd[:, encoders].any():
         tip = np.where(odd[:, :3].any(axis=1, keepdims=True), np.nan, gap[:, :3])
@@ -124,7 +123,7 @@ def tails(bench: Bench) -> list[Floats]:
     """Per run (n, c) >= 1: by how much a reading counts less because it lies far from its neighbours (heavy tails)."""
     out = []
     for k, run in enumerate(bench.runs):
-        gap = bench.observed(k) - bench.channels(k, bench.nominal[k])
+        gap = bench.off(k)
         weight = np.ones_like(gap)
         for c, x in enumerate(gap.T):
             known = np.flatnonzero(np.isfinite(x))

@@ -92,10 +92,9 @@ def dictionary(bench: Bench) -> Dictionary:
     """All functions of the channels that were measured, at the rows that are kept after thinning, without those that are zero in
     every run; unit size is 1 um or 1 N.
     """
-    actuators, m = bench.actuators, len(bench.actuators)
+    actuators = bench.actuators
     motions, drives, forces, tips, turns = zip(*(_covariates(bench, k) for k in range(len(bench.runs))), strict=True)
     rows = [len(tip) for tip in tips]
-    first = dict(zip(KINDS, (0, 3, 3 + m, 3 + 2 * m), strict=True))
     kinds = [
         kind
         for kind in KINDS
@@ -108,7 +107,7 @@ def dictionary(bench: Bench) -> Dictionary:
         count = max(map(len, functions))
         full = [own or [np.zeros(n)] * count for own, n in zip(functions, rows, strict=True)]
         each = [run for run in zip(*full, strict=True) if any(np.abs(v).max(initial=0.0) >= 1e-12 for v in run)]
-        found.extend((kind, label, first[kind] + channel, run) for run, channel in product(each, channels))
+        found.extend((kind, label, bench.parts[kind].start + channel, run) for run, channel in product(each, channels))
 
     for j, a in enumerate(actuators):
         for name, functions in _of_actuator(motions, drives, j).items():
@@ -133,8 +132,8 @@ def dictionary(bench: Bench) -> Dictionary:
                 _smooth([tip[:, axis] for tip in tips], 2 * ORDERS, REPEATABILITY_MM),
             )
     on = np.array([channel for *_, channel, _ in found], int)
-    mine = [np.flatnonzero(on == channel) for channel in range(6 + 2 * m)]
-    size = np.where((on < 3 + m), 1e-3, 1.0)
+    mine = [np.flatnonzero(on == channel) for channel in range(bench.parts["dyno"].stop)]
+    size = np.where(on < bench.parts["drive"].start, 1e-3, 1.0)
     blocks = []
     for run, n in enumerate(rows):
         each = np.stack([values[run] for *_, values in found], axis=1) * size if found else np.zeros((n, 0))

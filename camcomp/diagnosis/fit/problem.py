@@ -79,9 +79,7 @@ class Problem:
 
     def channels_of(self, kind: str) -> slice:
         """The channels of a kind (patterns.KINDS)."""
-        m = len(self.bench.actuators)
-        first = dict(zip(KINDS, (0, 3, 3 + m, 3 + 2 * m, 6 + 2 * m), strict=False))[kind]
-        return slice(first, first + (3 if kind in ("tip", "dyno") else m))
+        return self.bench.parts[kind]
 
     def kind_of(self, channel: int) -> str:
         """The kind (patterns.KINDS) of a channel."""

@@ -34,7 +34,7 @@ def start_columns(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> 
     """One column per run and actuator for the rows before it has moved, where there are enough of them, and one for the force
     with which its guide holds it: name, size, column per run (as `only` makes it of all rows of one run).
     """
-    found, m = list[Nuisance](), len(bench.actuators)
+    found = list[Nuisance]()
     for r, run in enumerate(bench.runs):
         if not run.run_path.ordered:
             continue
@@ -50,7 +50,7 @@ def start_columns(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> 
             found.append((f"start.{run.name}.{a}", width / lever, only(r, shift)))
             if begins and run.measured.has("drive"):
                 held = np.zeros_like(shift)
-                held[:, 3 + m + j] = still
+                held[:, bench.parts["drive"]][:, j] = still
                 found.append((f"held.{run.name}.{a}", START_N * lever, only(r, held)))
     return found
 
@@ -64,12 +64,10 @@ def unknown_starts(bench: Bench, k: int) -> Floats:
     out, path = np.zeros_like(bench.observed(k)), bench.runs[k].run_path
     if not path.ordered or len(path.time) < 3:
         return out
-    m = len(bench.actuators)
-    out[:, 3 : 3 + m] = _swing(path.time, path.row_rho)
+    out[:, bench.parts["encoder"]] = _swing(path.time, path.row_rho)
     behind = np.flatnonzero(missing_rows(path.time)) + 1
     behind = behind[behind < len(path.time) - 1]
-    for j in range(m):
-        lever = bench.levers[j]
+    for j, lever in enumerate(bench.levers):
         rho = lever * path.row_rho[:, j]
         turned = behind[(rho[behind] - rho[behind - 1]) * (rho[behind + 1] - rho[behind]) <= 0.0]
         rows: list[int] = []
@@ -81,7 +79,7 @@ def unknown_starts(bench: Bench, k: int) -> Floats:
         unknown = np.zeros(len(path.time))
         unknown[rows] = START_MM / lever
         out[:, :3] = np.hypot(out[:, :3], bench.turned(k, bench.row_slopes[k][:, :, j] * unknown[:, None]))
-        out[rows, 3 + m + j] = START_N * lever
+        out[rows, bench.parts["drive"].start + j] = START_N * lever
     return out
 
 

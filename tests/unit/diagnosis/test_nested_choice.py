@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.answer.nested import causes_without
+from camcomp.diagnosis.answer.held_out import causes_without
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Scale, probabilities
 from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
 from camcomp.diagnosis.statistics.normal_equations import sum_grams
