@@ -172,7 +172,7 @@ def drivers(case: PoseCase, intervals: Sequence[IntervalShare]) -> tuple[Driver,
     shares: dict[str, float] = {}
     before = _energy(residuals(case.model, plain, found.members))
     for name in clear & set(gains):
-        after = _energy_beside(case, gains[name][1])
+        after = _energy(residuals(case.model, gains[name][1], found.members, unmodelled=False))
         key = name.split(BY)[0]
         shares[key] = max(shares.get(key, 0.0), min(max(1.0 - after / max(before, 1e-300), 0.0), 1.0))
     if found.background.process is not None and found.background.process.over == "time":
@@ -183,14 +183,6 @@ def drivers(case: PoseCase, intervals: Sequence[IntervalShare]) -> tuple[Driver,
 
 def _energy(parts: Sequence[Floats]) -> float:
     return sum(float((r**2).sum()) for r in parts)
-
-
-def _energy_beside(case: PoseCase, background: Background) -> float:
-    """Energy of the residual, in floors, with a further covariate fitted."""
-    model, found = case.model, case.explanation
-    at = model.posterior(background, model.reduced(background).slab(found.members))
-    groups = [model.groups[g] for g in model.own]
-    return _energy([(g.y - model.layout.design(g) @ at.mean) / g.sd for g in groups])
 
 
 def _intervals(case: PoseCase) -> tuple[IntervalShare, ...]:

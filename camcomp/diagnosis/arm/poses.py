@@ -283,19 +283,20 @@ class ArmBench:
         causes = combined(columns, amounts)
         joints = self.joint_motion(campaign, causes, frame)
         X = np.empty((*here.shape, len(columns)))
-        waves = [j for j, column in enumerate(columns) if column.effect == CURVE]
-        X[:, :, waves] = wave_motion(joints, self.actuators, campaign.q, [columns[j] for j in waves])
-        for j in sorted(set(range(len(columns))) - set(waves)):
-            module = columns[j].module
-            if signal_path.stages_of(module) == {"drive"} and not signal_path.pushes(module) and j not in amounts:
-                cause = complete(columns[j].cause(1.0))
+        for j, column in enumerate(columns):
+            module = column.module
+            if column.effect == CURVE:
+                a = self.actuators.index(str(column.target))
+                X[:, :, j] = joints[:, :, a] * wave(column, campaign.q[:, a])[:, None]
+            elif signal_path.stages_of(module) == {"drive"} and not signal_path.pushes(module) and j not in amounts:
+                cause = complete(column.cause(1.0))
                 error, _ = signal_path.driven([cause], self.actuators, _standing(self.robot, campaign))
                 X[:, :, j] = np.einsum("nim,nm->ni", joints, error)
-                continue
-            moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + SHARE_OF_SCALE})
-            if columns[j].shape and j not in amounts:  # another shape of the same place may act
-                moved = [*causes, *combined(columns, {j: SHARE_OF_SCALE})]
-            X[:, :, j] = (self.standing(campaign, moved).tips(frame) - here) / SHARE_OF_SCALE
+            else:
+                moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + SHARE_OF_SCALE})
+                if column.shape and j not in amounts:  # another shape of the same place may act
+                    moved = [*causes, *combined(columns, {j: SHARE_OF_SCALE})]
+                X[:, :, j] = (self.standing(campaign, moved).tips(frame) - here) / SHARE_OF_SCALE
         return X
 
     def joint_motion(self, poses: Poses, causes: Sequence[Cause], at: Registration) -> Floats:
@@ -335,15 +336,6 @@ def combined(columns: Sequence[Column], amounts: Mapping[int, float]) -> list[Ca
         values = {**merged[key].values, **one.values} if key in merged else one.values
         merged[key] = replace(one, values=values)
     return [replace(c, values=public_values(c.effect, c.values)) for c in merged.values()]
-
-
-def wave_motion(joints: Floats, actuators: Sequence[str], q: Floats, columns: Sequence[Column]) -> Floats:
-    """Motion (n, 3, k) of tips by waves of joints, in units of their scales. joints (n, 3, m): per rad of every joint."""
-    out = np.empty((*joints.shape[:2], len(columns)))
-    for j, column in enumerate(columns):
-        a = list(actuators).index(str(column.target))
-        out[:, :, j] = joints[:, :, a] * wave(column, q[:, a])[:, None]
-    return out
 
 
 def wave(column: Column, angle: Floats) -> Floats:

@@ -92,8 +92,9 @@ def intervals(
     pure = chi2.isf(FALSE / len(stretches), rows_each) / rows_each  # what even white noise reaches
     chances = norm.logsf((log - middle) / max(spread, 1e-12)) / np.log(10.0) + np.log10(len(stretches))
     out = (chances < np.log10(FALSE)) & (size > LOCAL * floor**2) & (size > pure * np.exp(middle))
-    shared = np.array([_going_on(left[k][rows]) for k, rows in stretches])
-    out &= shared > 0.5 * (LOCAL - 1.0) * floor**2  # half of what is beyond the floor
+    # products of neighbouring rows: of what goes on their squares, of noise nothing, however large it is
+    lasting = np.array([np.mean(left[k][rows][1:] * left[k][rows][:-1]) for k, rows in stretches])
+    out &= lasting > 0.5 * (LOCAL - 1.0) * floor**2  # half of what is beyond the floor
     joined: list[IntervalShare] = []
     for i in np.flatnonzero(out).tolist():
         k, rows = stretches[i]
@@ -103,11 +104,6 @@ def intervals(
             begin, share = before.t0_s, before.share + share
         joined.append(IntervalShare(run=names[k], t0_s=float(begin), t1_s=float(times[k][rows[-1]]), share=share))
     return tuple(joined), float(chances[out].min(initial=0.0))
-
-
-def _going_on(left: Floats) -> float:
-    """Mean product of rows (n,) and those behind them: of what goes on its mean square, of noise nothing, however large it is."""
-    return float(np.mean(left[1:] * left[:-1]))
 
 
 def _count(time: Floats) -> int:

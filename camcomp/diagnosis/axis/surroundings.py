@@ -18,7 +18,7 @@ from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground.datatypes import STANDARD_GRAVITY, Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause
-from camcomp.model.statics.arm import ARM_LENGTH, Arm, arm_of, end_pose, jacobian
+from camcomp.model.statics.arm import ARM_LENGTH, arm_of, end_pose, jacobian
 from camcomp.model.statics.description import Actuator, Robot
 from camcomp.model.statics.hanging import hang, tool_wrench
 from camcomp.model.statics.masses import has_moved_mass, mass_loads
@@ -149,19 +149,15 @@ class AxisSurroundings:
     def _rates(self, run: str, time: Floats) -> Floats:
         """Motion (n, i, m) of the tip per unit of every actuator; a slide of a machine that is no arm moves it by its own error."""
         arm, m = None if self.robot is None else arm_of(self.robot), len(self._actuators)
-        if arm is None:
+        if arm is None or self.robot is None:
             return np.broadcast_to(np.eye(m), (len(time), m, m))
         at = np.unique(np.linspace(0, len(time) - 1, min(POSES, len(time))).round().astype(int))
-        q = self.coordinates(run, time[at])
-        rates = np.array([self._tip_rates(arm, row) for row in q])
+        rates = []
+        for q in self.coordinates(run, time[at]):
+            twist, (rotation, _) = jacobian(arm, q), end_pose(arm, q)
+            rates.append(twist[:3] + np.cross(twist[3:].T, rotation @ self.robot.tool).T)
         out = np.empty((len(time), 3, m))
         for i in range(3):
             for j in range(m):
-                out[:, i, j] = np.interp(time, time[at], rates[:, i, j])
+                out[:, i, j] = np.interp(time, time[at], [each[i, j] for each in rates])
         return out
-
-    def _tip_rates(self, arm: Arm, q: Floats) -> Floats:
-        """Rates (3, m) of the tip at joint coordinates q (m,)."""
-        assert self.robot is not None
-        twist, (rotation, _) = jacobian(arm, q), end_pose(arm, q)
-        return np.asarray(twist[:3] + np.cross(twist[3:].T, rotation @ self.robot.tool).T)

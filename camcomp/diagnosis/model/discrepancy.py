@@ -125,12 +125,13 @@ def fit_process(groups: Sequence[Group], left: Sequence[Floats], over: str) -> S
     return best[1]
 
 
-def residuals(model: LinearModel, background: Background, members: Members) -> list[Floats]:
-    """Residuals (n, c) of the fitted groups in floors, with causes, minor effects and nuisances fitted; discrepancy
-    stays in them.
+def residuals(model: LinearModel, background: Background, members: Members, *, unmodelled: bool = True) -> list[Floats]:
+    """Residuals (n, c) of the fitted groups in floors, with causes, minor effects and nuisances fitted.
+
+    unmodelled: whether the discrepancy stays in them.
     """
     mean = model.posterior(background, model.reduced(background).slab(members)).mean.copy()
-    for name, own in model.layout.covariates.items():
+    for name, own in model.layout.covariates.items() if unmodelled else ():
         mean[own] = mean[own] if name in model.healthy else 0.0
     out = []
     for group in (model.groups[g] for g in model.own):

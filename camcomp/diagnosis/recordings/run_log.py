@@ -92,7 +92,8 @@ def _parts(
         values = {log: _read(source, each) for log, each in picked.columns.items() if each.part == k}
         if not values:
             continue
-        time = _clock(source, k, picked)
+        pick = picked.times.get(k)
+        time = source.time if pick is None else seconds(source.read(pick.column), pick.factor)
         there = np.any([np.isfinite(each) for log, each in values.items() if log != LINE or len(values) == 1], axis=0)
         _say(notes, int((~there).sum()), "rows without values dropped", source)
         if time is not None:
@@ -118,12 +119,6 @@ def _read(source: SampledColumns, pick: Pick) -> Floats:
         message = f"{values[wild[0]]:g} in row {wild[0] + 1} of column {source.names[pick.column]} is no value"
         raise ConfigError("CC422", message, at=source.at(int(wild[0]), pick.column))
     return values
-
-
-def _clock(source: SampledColumns, part: int, picked: Picked) -> Floats | None:
-    """Times (n,) s of a part, from the assigned column, else its own."""
-    pick = picked.times.get(part)
-    return source.time if pick is None else seconds(source.read(pick.column), pick.factor)
 
 
 def _in_rad(

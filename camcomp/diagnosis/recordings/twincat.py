@@ -40,7 +40,7 @@ def read_scope(data: bytes, name: str) -> list[SampledColumns]:
         label = line.split(mark, 1)[0].strip()
         if label == _UNIT and i > head:
             units = next(csv.reader([line], delimiter=mark))
-        if i != head and label and not _begins_number(label):
+        if i != head and label and not (label[0] in "+-.," or label[0].isdigit()):
             lines[i] = ""
     table = read_csv("\n".join(lines), name, TABLE_RULES, spreadsheet=True)
     timed: dict[int, list[int]] = {}
@@ -51,10 +51,6 @@ def read_scope(data: bytes, name: str) -> list[SampledColumns]:
             timed[max(timed)].append(j)
     of_columns = [_unit(units, k) for k in range(len(table.header))]
     return [of_table(table, columns, _times(table, j), of_columns) for j, columns in timed.items() if columns]
-
-
-def _begins_number(label: str) -> bool:
-    return label[:1] in "+-.," or label[:1].isdigit()
 
 
 def _times(table: CsvTable, column: int) -> Floats:
