@@ -270,9 +270,7 @@ def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundLaw | None:
 
 def _covariates(spot: Spot, size: Sizes) -> list[tuple[str, ...]]:
     if spot.on in ("control", "drive"):
-        return [
-            (name,) for name in ("act_mm", "act_rad", "temp_C", "cut_min")[: 1 if size.limits else 0] if size.wide(name)
-        ]
+        return [("act_mm",)] if size.wide("act_mm") else []
     axes = [f"{a}_mm" for a in "xyz" if size.wide(f"{a}_mm")]
     pairs = [(a, b) for i, a in enumerate(axes) for b in axes[i + 1 :]]
     return [*pairs, *((a,) for a in axes), *((name,) for name in _SINGLE if size.wide(name))]
