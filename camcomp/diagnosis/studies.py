@@ -62,7 +62,7 @@ def study_of(file: str | Path | ExperimentFile, without: Sequence[str] = ()) -> 
     as they are read.
     """
     opened = open_logs(read_experiment(file))
-    logs, robot, sd = opened.logs, opened.robot, opened.file.experiment.sd
+    logs, robot, sd, holdout = opened.logs, opened.robot, opened.file.experiment.sd, opened.file.experiment.holdout
     stated = StatedDeviation(**{f.name: getattr(sd, f.name) for f in fields(StatedDeviation)}) if sd else None
     try:
         if all(m.has("tip") and m.has("encoder") and not m.has("setpoint") for m in logs):
@@ -70,26 +70,19 @@ def study_of(file: str | Path | ExperimentFile, without: Sequence[str] = ()) -> 
                 return None
             runs = checked_poses(opened)
             own = _causes(opened.file.config)
-            holdout = opened.file.experiment.holdout
             result, notes = study_arm(robot, own, runs, holdout=holdout, without=without, stated=stated)
             bench = partial(bench_of, robot, tuple(own), runs, holdout)
             return LogStudy(result, partial(of_poses, bench, result), (*opened.notes, *notes))
         if not any(m.has("tip") for m in logs) and all(m.has("encoder") for m in logs):
             axes = checked_axes(opened)
-            result, found = study_axes(
-                axes, holdout=opened.file.experiment.holdout, without=without, stated=stated, robot=robot
-            )
+            result, found = study_axes(axes, holdout=holdout, without=without, stated=stated, robot=robot)
             by_axis = {a.name: a.revolute for a in robot.actuators}
             return LogStudy(result, partial(of_axes, found, by_axis), (*opened.notes, *_without_masses(opened)))
-    except np.linalg.LinAlgError as error:  # a ValueError too
-        message = (
-            f"the rows do not determine the fit: some columns do not move, or repeat others; {_channels_there(opened)}"
-        )
-        raise ConfigError("CC420", message, at=Location(display_name(opened.file.path), 1, 1)) from error
     except ValidationError:  # a ValueError too, and a fault of ours
         raise
     except ValueError as error:
-        message = f"{error}; {_channels_there(opened)}"
+        singular = "the rows do not determine the fit: some columns do not move, or repeat others"
+        message = f"{singular if isinstance(error, np.linalg.LinAlgError) else error}; {_channels_there(opened)}"
         raise ConfigError("CC420", message, at=Location(display_name(opened.file.path), 1, 1)) from error
     return None
 

@@ -39,8 +39,7 @@ from camcomp.ground.datatypes import Floats
 
 def causes(case: PoseCase) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]:
     """Causes of the most probable set in falling probability, and those too small to be causes."""
-    whole = sum(float((gap**2).sum()) for gap in case.gaps)
-    rows = sum(len(gap) for gap in case.gaps)
+    whole, rows = _energy(case.gaps), sum(map(len, case.gaps))
     out: list[FoundCause] = []
     minor: list[MinorEffect] = []
     for part in case.parts:
@@ -114,7 +113,7 @@ def with_unknown(case: PoseCase, named: tuple[FoundCause, ...], word: str) -> tu
     if word == "none":
         return ()
     if word == "unknown" or (word == "ambiguous" and not named):
-        share = round(min(_size(case.rest) ** 2 / _size(case.gaps) ** 2, 1.0), 4)
+        share = round(min(_energy(case.rest) / _energy(case.gaps), 1.0), 4)
         probability = case.unmodelled if word == "unknown" else EVEN
         return (*named, UnknownCause(target=None, probability=probability, share=share))
     return named
@@ -209,8 +208,3 @@ def _intervals(case: PoseCase) -> tuple[IntervalShare, ...]:
                     )
                 )
     return tuple(sorted(out, key=lambda each: -each.share))
-
-
-def _size(parts: Sequence[Floats]) -> float:
-    every = np.concatenate(list(parts))
-    return float(np.sqrt(np.mean((every**2).sum(axis=1))))

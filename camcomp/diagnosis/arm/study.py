@@ -50,11 +50,9 @@ def solve(
 
     Raises ValueError when every run is held out, or a campaign has too few poses for its frames.
     """
-    fitted = [r for r in runs if str(r.run[0]) not in holdout]
-    if not fitted:
+    own, held, loose = campaigns_of(robot, runs, holdout)
+    if not own:
         raise ValueError("every run is held out")
-    own = merged(fitted)
-    held, loose = judged_campaigns(robot, [r for r in runs if str(r.run[0]) in holdout], own)
     every = [drawn(each) for each in (*own, *held)]
     bench, shelf, outliers, weights = cleaned(robot, tuple(causes), every, len(own), without)
     gaps = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
@@ -83,8 +81,7 @@ def solve(
 
 def bench_of(robot: Robot, causes: tuple[Cause, ...], runs: Sequence[Poses], holdout: Sequence[str]) -> ArmBench:
     """All poses of the campaigns that are fitted and judged, with the frames that they are judged in."""
-    own = merged([r for r in runs if str(r.run[0]) not in holdout])
-    held, _ = judged_campaigns(robot, [r for r in runs if str(r.run[0]) in holdout], own)
+    own, held, _ = campaigns_of(robot, runs, holdout)
     return ArmBench(robot=robot, causes=causes, campaigns=[*own, *held], fitted=len(own))
 
 
@@ -204,18 +201,23 @@ def settled_floor(
 # -- campaigns ----------------------------------------------------------------------------------------------------------
 
 
-def judged_campaigns(robot: Robot, runs: Sequence[Poses], own: Sequence[Poses]) -> tuple[list[Poses], tuple[str, ...]]:
-    """Withheld campaigns that can be judged, and names of runs that cannot: their rows do not fix a frame of their own."""
-    labels = {each.label for each in own}
-    sound, loose = [], []
-    for label in dict.fromkeys(r.label for r in runs):
-        some = [r for r in runs if r.label == label]
+def campaigns_of(
+    robot: Robot, runs: Sequence[Poses], holdout: Sequence[str]
+) -> tuple[list[Poses], list[Poses], tuple[str, ...]]:
+    """Campaigns that are fitted, withheld ones that can be judged, and names of runs that cannot: their rows do not fix a frame
+    of their own.
+    """
+    own = merged([r for r in runs if str(r.run[0]) not in holdout])
+    labels, withheld = {each.label for each in own}, [r for r in runs if str(r.run[0]) in holdout]
+    held, loose = [], []
+    for label in dict.fromkeys(r.label for r in withheld):
+        some = [r for r in withheld if r.label == label]
         whole = merged(some, least=1)
         if label in labels or fixes_frame(robot, whole[0]):
-            sound += whole
+            held += whole
         else:
             loose += [str(r.run[0]) for r in some]
-    return sound, tuple(loose)
+    return own, held, tuple(loose)
 
 
 def fixes_frame(robot: Robot, poses: Poses) -> bool:

@@ -180,13 +180,9 @@ class LinearModel:
         absent: Sequence[int] = (),
     ) -> AmplitudePosterior:
         """Normal distribution of all columns except `absent`, from the given groups or from all fitted ones."""
-        k, data, precision = (
-            self.layout.effects,
-            self.total(background.process, groups),
-            self.precision(background, slab),
-        )
+        data, precision = self.total(background.process, groups), self.precision(background, slab)
         live = np.isfinite(precision)
-        live[:k] &= self.size > 0.0
+        live[: self.layout.effects] &= self.size > 0.0
         live[list(absent)] = False
         return AmplitudePosterior.of(data, precision, np.flatnonzero(live), background.noise)
 
