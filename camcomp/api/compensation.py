@@ -146,7 +146,7 @@ def compensate_file(
     Raises:
         FileError: an output cannot be written; and the errors of `compensate`.
     """
-    from camcomp.compensation.file_to_file import CorrectionSettings, FileOutcome, OutputPaths, compensate_long
+    from camcomp.compensation.file_to_file import CorrectionSettings, FileOutcome, OutputPaths, compensate_to_files
 
     machine = load_machine(*configs)
     if report:
@@ -157,7 +157,6 @@ def compensate_file(
         output = STANDARD
     settings, name = machine.config.compensation, display_name(program)
     with open_source(program) as file:
-        done = None
         if if_compensated == "pass" and is_stamped(data := file.read()):
             if output and not dry_run:
                 write_all({output: data}, inputs=(program, *configs, *mirror))
@@ -171,10 +170,8 @@ def compensate_file(
                 version=__version__,
                 arcs=arcs,
             )
-            paths_out = OutputPaths(output, joints, summary)
-            done = compensate_long(file, name, own, asked, paths=paths_out, inputs=(program, *configs), dry_run=dry_run)
-        if done is not None:
-            return done
+            names = OutputPaths(output, joints, summary)
+            return compensate_to_files(file, name, own, asked, paths=names, inputs=(program, *configs), dry_run=dry_run)
         data = file.read()
     from camcomp.model.control import program_of
 

@@ -1,15 +1,14 @@
-"""Programs that are corrected in pieces, and the outputs that the pieces go to."""
+"""A program from file to files: corrected in pieces where it is long enough for that, otherwise as a whole."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
-from functools import partial
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, BinaryIO
 
 from camcomp.compensation.program.result import Summary, interpolation_failed
-from camcomp.compensation.report.tables import JointTable
-from camcomp.ground.errors import ProgramError
+from camcomp.compensation.report.tables import JointTable, joint_bytes
+from camcomp.gcode.stamp import is_stamped
+from camcomp.ground.errors import CheckFailed, ProgramError
 from camcomp.ground.files import writing
 from camcomp.ground.records import dataclass
 from camcomp.model.job import Job
@@ -47,7 +46,7 @@ class FileOutcome:
 
 @dataclass(frozen=True, kw_only=True)
 class CorrectionSettings:
-    """Settings of a correction in pieces. arcs: whether arcs stay arcs; None: as the machine file says."""
+    """Settings of a correction. arcs: whether arcs stay arcs; None: as the machine file says."""
 
     method: str
     tolerance_um: float
@@ -59,78 +58,99 @@ def is_for_pieces(source: BinaryIO, job: Job, settings: CorrectionSettings) -> b
     """Whether a seekable program is long enough, and machine and method are such, that it is corrected in pieces."""
     size = source.seek(0, 2)
     source.seek(0)
-    return size >= LONG and settings.method == "newton" and len(job.machine.actuators) == 3 and _goes_in_pieces(job)
+    if size < LONG or settings.method != "newton" or len(job.machine.actuators) != 3:
+        return False
+    # masses look ahead, and what effects do has to depend on the piece and the time before it alone
+    simple = not job.config.uncertain and not has_moved_mass(job.real_machine.robot)
+    return not job.causes or (simple and not has_memory(job.causes))
 
 
-def _goes_in_pieces(job: Job) -> bool:
-    """Whether what effects do at a point depends on the piece of the program alone, and on the time before it."""
-    if not job.causes:
-        return True
-    simple = not job.config.uncertain and not has_moved_mass(job.real_machine.robot)  # masses look ahead
-    return simple and not has_memory(job.causes)
+@dataclass(frozen=True, kw_only=True)
+class OpenOutputs:
+    """Files that a corrected program and its joint table go to; None omits one. table: name of the joint table."""
+
+    program: BinaryIO | None
+    joints: BinaryIO | None
+    table: str | None
+
+    def clear(self) -> None:
+        """Forget what was written."""
+        for file in filter(None, (self.program, self.joints)):
+            file.seek(0)
+            file.truncate()
 
 
-def compensate_in_pieces(
-    source: BinaryIO, name: str, job: Job, settings: CorrectionSettings, program: Callable[[bytes], object],
-    joints: Callable[[], JointTable] | None,
-) -> Totals | None:  # fmt: skip
-    """Correct a program of at least LONG bytes in pieces; None if it has to be corrected as a whole.
-
-    source: the program, seekable, at its start and left there on None. name: that of messages. program: receives the
-    corrected program in order; on None what it received is void. joints: opens the joint table.
+def compensate_into(
+    source: BinaryIO, name: str, job: Job, settings: CorrectionSettings, outputs: OpenOutputs
+) -> Totals:
+    """Correct a seekable program at its start. name: that of messages.
 
     A program with a mistake is left to the reader of whole programs, which finds all of them; one of up to MOST_EXACT bytes
     whose interpolation fails its check is left to the exact way. Raises CheckFailed CC603
     for a program that was compensated before, and the errors of physics and files.
     """
-    if not is_for_pieces(source, job, settings):
-        return None
+    totals = _in_pieces(source, name, job, settings, outputs) if is_for_pieces(source, job, settings) else None
+    if totals is not None:
+        return totals
+    from camcomp.compensation.long.answers import compensate_whole
+    from camcomp.compensation.program.totals import Totals
+    from camcomp.model.control import program_of
+
+    outputs.clear()
+    source.seek(0)
+    data = source.read()
+    if is_stamped(data):
+        raise CheckFailed("CC603", f"{name} was compensated before")
+    result = compensate_whole(program_of(data, name, job.config), job, **vars(settings))
+    totals = Totals.of(result, job)
+    if outputs.program is not None:
+        outputs.program.write(result.written.data)
+    if outputs.joints is not None and outputs.table is not None:
+        outputs.joints.write(joint_bytes(result, job, outputs.table))
+    return totals
+
+
+def _in_pieces(
+    source: BinaryIO, name: str, job: Job, settings: CorrectionSettings, outputs: OpenOutputs
+) -> Totals | None:
+    """`compensate_into` for a long program; None if it has to be corrected as a whole."""
     from camcomp.compensation.long.linear_run import NotInPieces
     from camcomp.compensation.long.program import LongProgram
     from camcomp.model.control import setup_of
 
+    table = None
     try:
-        table = joints() if joints is not None else None
+        if outputs.joints is not None and outputs.table is not None:
+            table = JointTable(outputs.joints, outputs.table, job)
         pieces = LongProgram(
             job=job, name=name, setup=setup_of(job.config), tolerance_um=settings.tolerance_um,
             version=settings.version, arcs=settings.arcs, on_rows=None if table is None else table.add,
         )  # fmt: skip
-        totals = pieces.run(source, program)
-        if table is not None:
-            table.close()
+        totals = pieces.run(source, len if outputs.program is None else outputs.program.write)
     except (NotInPieces, ProgramError) as error:
         if isinstance(error, ProgramError) and error.rule == "CC142":
             raise  # only the stock raises it, and the other reader would raise it again
-        source.seek(0)
         return None
+    finally:
+        if table is not None:
+            table.close()
     failed = interpolation_failed(totals.interpolated) and source.seek(0, 2) <= MOST_EXACT
-    source.seek(0)
     return None if failed else totals
 
 
-def compensate_long(
+def compensate_to_files(
     source: BinaryIO, name: str, job: Job, settings: CorrectionSettings, *, paths: OutputPaths, inputs: Sequence[str], dry_run: bool
-) -> FileOutcome | None:  # fmt: skip
-    """Correct a program of at least LONG bytes in pieces, from file to files; arguments and errors as above."""
-    if not is_for_pieces(source, job, settings):
-        return None
+) -> FileOutcome:  # fmt: skip
+    """`compensate_into` named files, all of them or none."""
     names = paths.names()
-    with suppress(_AsAWhole), writing(names, inputs=inputs, keep=not dry_run) as files:
-        joints = None if paths.joints is None else partial(JointTable, files[paths.joints], paths.joints, job)
-        totals = compensate_in_pieces(
-            source=source, name=name, job=job, settings=settings,
-            program=files[paths.program].write if paths.program else len, joints=joints,
-        )  # fmt: skip
-        if totals is None:
-            raise _AsAWhole  # files of an interrupted block are not kept
+    with writing(names, inputs=inputs, keep=not dry_run) as files:
+        program, joints = (None if each is None else files[each] for each in (paths.program, paths.joints))
+        totals = compensate_into(
+            source, name, job, settings, OpenOutputs(program=program, joints=joints, table=paths.joints)
+        )
         figures = totals.summary()
         if paths.summary:
             files[paths.summary].write(figures.to_json())
         return FileOutcome(
             figures, totals.failed_checks(settings.tolerance_um), {each: files[each].tell() for each in names}
         )
-    return None
-
-
-class _AsAWhole(Exception):
-    """The program has to be corrected as a whole."""

@@ -22,11 +22,12 @@ from types import ModuleType
 from typing import Any
 
 from camcomp import __version__
-from camcomp.compensation.batch.worker import BUG, Outcome, Task, live_with_parent, work
+from camcomp.compensation.batch.worker import BUG, Outcome, Task, failed, live_with_parent, work
 from camcomp.ground.errors import ConfigError, FileError
 from camcomp.ground.machine_code import ROOT
 from camcomp.ground.notes import note
 
+DIED = "the worker process died, perhaps for lack of memory"
 DEATHS = 3  # workers that a task may bring down before it is given up
 CONNECT = 10.0  # s within which a scheduler has to answer
 LOOK = 1.0  # s between two looks at a cluster in which nothing happens
@@ -88,7 +89,7 @@ def on_this_machine(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
             yield from _on_workers(iter([task]), open_tasks, 1)
         except BrokenProcessPool:
             open_tasks.pop(task.key)
-            yield died(task.key)
+            yield failed(task.key, BUG, DIED, where="internal error: ")
 
 
 def _on_workers(tasks: Iterator[Task], open_tasks: dict[str, Task], jobs: int) -> Iterator[Outcome]:
@@ -121,14 +122,6 @@ def _on_workers(tasks: Iterator[Task], open_tasks: dict[str, Task], jobs: int) -
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def died(key: str) -> Outcome:
-    """Outcome of a task that brought its workers down."""
-    text = "the worker process died, perhaps for lack of memory"
-    return Outcome(
-        key=key, exit_code=BUG, messages=[{"rule": None, "message": text, "text": f"internal error: {text}"}]
-    )
 
 
 def on_a_cluster(tasks: Iterable[Task], address: str, tell: Callable[[str], None] = print) -> Iterator[Outcome]:
@@ -194,7 +187,7 @@ class _Cluster:
         try:
             outcome: Outcome = future.result(timeout=LOOK)
         except KilledWorker:
-            return died(key)
+            return failed(key, BUG, DIED, where="internal error: ")
         except (
             CancelledError,
             asyncio.CancelledError,
@@ -204,9 +197,7 @@ class _Cluster:
         except Exception as error:  # noqa: BLE001 - the cluster's, not the task's: `work` never raises
             self._workers()
             text = f"the cluster did not do it: {type(error).__name__}: {error}"
-            return Outcome(
-                key=key, exit_code=FileError.exit_code, messages=[{"rule": "CC503", "message": text, "text": text}]
-            )
+            return failed(key, FileError.exit_code, text, rule="CC503")
         if outcome.version != __version__:
             self._refuse("a worker", outcome.version)
         return outcome

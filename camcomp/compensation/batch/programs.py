@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from camcomp.compensation.batch.worker import Outcome, Task
+from camcomp.compensation.batch.worker import Outcome, Task, messages_of
 from camcomp.gcode.detect import endings
-from camcomp.ground.errors import CamcompError, ConfigError, FileError, format_error
+from camcomp.ground.errors import CamcompError, ConfigError, FileError
 from camcomp.ground.files import alone_in, display_name, read_bytes, write_all
 from camcomp.ground.places import one_place_each
 from camcomp.ground.records import dataclass, field
@@ -237,9 +237,8 @@ def _keep(plan: Plan, found: FoundProgram, outcome: Outcome) -> Status:
 
 
 def _refused(found: FoundProgram, error: CamcompError) -> Status:
-    messages = [{"rule": each.rule, "message": each.message, "text": format_error(each)} for each in error.all()]
     return Status(
-        source=str(found.source), output=None, status=ERROR, exit_code=error.exit_code, figures={}, messages=messages
+        source=str(found.source), output=None, status=ERROR, exit_code=error.exit_code, messages=messages_of(error)
     )
 
 

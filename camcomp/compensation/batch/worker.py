@@ -8,7 +8,7 @@ import pickle
 import signal
 import threading
 import warnings
-from functools import lru_cache, partial
+from functools import lru_cache
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,6 @@ from camcomp.ground.progress import watched
 from camcomp.ground.records import dataclass, field
 
 if TYPE_CHECKING:
-    from camcomp.compensation.program.totals import Totals
     from camcomp.model.from_program import StockChoice
     from camcomp.model.job import Job
 
@@ -83,70 +82,47 @@ def work(task: Task) -> Outcome:
             with watched():  # a program is one step of the batch around it
                 return _compensate(task)
     except CamcompError as error:
-        return Outcome(
-            key=task.key,
-            exit_code=error.exit_code,
-            messages=[_message(each, format_error(each)) for each in error.all()],
-        )
+        return Outcome(key=task.key, exit_code=error.exit_code, messages=messages_of(error))
     except MemoryError:
-        text = "there is not enough memory"
-        return Outcome(
-            key=task.key,
-            exit_code=FileError.exit_code,
-            messages=[{"rule": "CC503", "message": text, "text": f"{task.name}: {text}"}],
-        )
+        return failed(task.key, FileError.exit_code, "there is not enough memory", rule="CC503", where=f"{task.name}: ")
     except Exception as error:  # noqa: BLE001 - a bug in one program must not take the others with it
         text = f"internal error: {type(error).__name__}: {error}"
-        return Outcome(
-            key=task.key, exit_code=BUG, messages=[{"rule": None, "message": text, "text": f"{task.name}: {text}"}]
-        )
+        return failed(task.key, BUG, text, where=f"{task.name}: ")
+
+
+def failed(key: str, exit_code: int, text: str, *, rule: str | None = None, where: str = "") -> Outcome:
+    """Outcome of a task without outputs; where: what stands in front of the text for the user."""
+    return Outcome(key=key, exit_code=exit_code, messages=[{"rule": rule, "message": text, "text": where + text}])
+
+
+def messages_of(error: CamcompError) -> list[dict[str, Any]]:
+    """Messages of an error and of those that came with it."""
+    return [
+        {"rule": each.rule, "message": each.message, "text": format_error(each),
+         **({"file": each.at.file, "line": each.at.line, "column": each.at.column} if each.at else {})}
+        for each in error.all()
+    ]  # fmt: skip
 
 
 def _compensate(task: Task) -> Outcome:
-    from camcomp.compensation.program.compensate import compensate
-    from camcomp.compensation.program.totals import Totals
-    from camcomp.compensation.report.tables import joint_bytes
+    from camcomp.compensation.file_to_file import CorrectionSettings, OpenOutputs, compensate_into
     from camcomp.gcode.stamp import is_stamped
-    from camcomp.ground.errors import CheckFailed
-    from camcomp.model.control import program_of
     from camcomp.model.from_program import job_of_program
 
-    if is_stamped(task.data):
-        if task.passes:
-            return Outcome(key=task.key, exit_code=0, program=task.data)
-        raise CheckFailed("CC603", f"{task.name} was compensated before")
-    shared = _job(task.config)
-    job = job_of_program(shared, task.data, task.name, task.stock)
-    if (outcome := _in_pieces(task, job)) is not None:
-        return outcome
-    program = program_of(task.data, task.name, shared.config)
-    result = compensate(program, job, method=task.method, tolerance_um=task.tolerance_um, version=__version__)
-    joints = joint_bytes(result, job, TABLE) if task.joints else None
-    return _outcome(task, Totals.of(result, job), result.written.data, joints)
-
-
-def _in_pieces(task: Task, job: Job) -> Outcome | None:
-    """The outcome of a long program, as `camcomp compensate` writes it; None: it is corrected as a whole."""
-    from camcomp.compensation.file_to_file import CorrectionSettings, compensate_in_pieces
-    from camcomp.compensation.report.tables import JointTable
-
-    program, joints = BytesIO(), BytesIO()
-    totals = compensate_in_pieces(
-        source=BytesIO(task.data), name=task.name, job=job,
-        settings=CorrectionSettings(method=task.method, tolerance_um=task.tolerance_um, version=__version__),
-        program=program.write, joints=partial(JointTable, joints, TABLE, job) if task.joints else None,
-    )  # fmt: skip
-    if totals is None:
-        return None
-    return _outcome(task, totals, program.getvalue(), joints.getvalue() if task.joints else None)
-
-
-def _outcome(task: Task, totals: Totals, program: bytes, joints: bytes | None) -> Outcome:
-    failed = totals.failed_checks(task.tolerance_um)
-    checks = [{"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"} for rule, text in failed]
+    if task.passes and is_stamped(task.data):
+        return Outcome(key=task.key, exit_code=0, program=task.data)
+    settings = CorrectionSettings(method=task.method, tolerance_um=task.tolerance_um, version=__version__)
+    job = job_of_program(_job(task.config), task.data, task.name, task.stock)
+    program, joints = BytesIO(), BytesIO() if task.joints else None
+    outputs = OpenOutputs(program=program, joints=joints, table=TABLE)
+    totals = compensate_into(BytesIO(task.data), task.name, job, settings, outputs)
+    checks = [
+        {"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"}
+        for rule, text in totals.failed_checks(task.tolerance_um)
+    ]
     return Outcome(
-        key=task.key, exit_code=int(bool(failed)), messages=checks, program=program, joints=joints,
-        figures=totals.summary().as_json(), notes=held(),
+        key=task.key, exit_code=int(bool(checks)), messages=checks, program=program.getvalue(),
+        joints=None if joints is None else joints.getvalue(), figures=totals.summary().as_json(), notes=held(),
     )  # fmt: skip
 
 
@@ -155,8 +131,3 @@ def _job(config: bytes) -> Job:
     from camcomp.model.job import Job
 
     return Job(pickle.loads(config))
-
-
-def _message(error: CamcompError, text: str) -> dict[str, Any]:
-    where = {"file": error.at.file, "line": error.at.line, "column": error.at.column} if error.at else {}
-    return {"rule": error.rule, "message": error.message, "text": text, **where}

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 import numpy as np
 
 from camcomp.compensation.bands.outcome import LITTLE, Bands
 from camcomp.compensation.program.result import Summary
-from camcomp.compensation.report.figures import DrawnPath, scene_of
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.compensation.report.figures import LOGARITHMIC, DrawnPath, along_path, scene_of
+from camcomp.ground.datatypes import Bools
 from camcomp.report.page import Section, Table
-from camcomp.report.plot import STYLES, Figure, Json, axis, brief, broken, gapped, line, micrometres, thin
+from camcomp.report.plot import STYLES, Figure, Json, brief, broken, gapped, micrometres, thin
 
-FLOOR_UM = 1e-4  # below what a logarithmic axis can show
 KINDS = ("trusted", "doubtful", "shrunk", "left alone")
 
 
@@ -48,17 +49,10 @@ def kinds_of(bands: Bands) -> dict[str, Bools]:
 
 def _figure_band(drawn: DrawnPath, bands: Bands) -> Figure:
     band = bands.band_um()
-    index, gap = broken(thin(np.column_stack((drawn.after, drawn.driven, np.nan_to_num(band)))), drawn.hidden)
-    s = gapped(drawn.s, index, gap, 4)
-
-    def curve(values: Floats) -> list[float | None]:
-        return gapped(np.where(values > 0.0, np.maximum(values, FLOOR_UM), np.nan), index, gap, 6)
-
-    after = line("corrected, model exact", s, curve(drawn.after), 1)
-    upper = line("corrected, 95 % of machines below", s, curve(band), 2)
-    driven = line(f"corrected, as the control drives it in {drawn.mode}", s, curve(drawn.driven), 3)
-    between = _area(s, curve(drawn.after), curve(band))
-    before = line("original program", s, curve(drawn.before), 0)
+    values = np.column_stack((drawn.before, drawn.after, band, drawn.driven))
+    names = ("original program", "corrected, model exact", "corrected, 95 % of machines below")
+    before, after, upper, driven = drawn.errors(np.where(values > 0.0, values, np.nan), *names)
+    between = _area(after["x"], after["y"], upper["y"])
     at = drawn.worst(band)
     words = f"up to {micrometres(band[at])}, in source line {drawn.line[at]}"
     return Figure(
@@ -68,33 +62,23 @@ def _figure_band(drawn: DrawnPath, bands: Bands) -> Figure:
         f"machines within the stated spreads stay below: {words}. What the control merges and rounds is a curve of its own. Logarithmic scale.",
         label=f"Plot of the residual and its 95 % band along the path: {words}.",
         traces=[between, after, driven, upper, before],
-        layout={
-            "xaxis": axis("path length in mm"),
-            "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power"),
-        },
+        layout=along_path("error in µm", **LOGARITHMIC),
     )
 
 
 def _area(x: list[float | None], low: list[float | None], high: list[float | None]) -> Json:
     """The area between two curves, section by section where both are drawn."""
-    outline: tuple[list[float | None], list[float | None]] = ([], [])
-    section: list[tuple[float, float, float]] = []
-    for at, bottom, top in (*zip(x, low, high, strict=True), (None, None, None)):
-        if at is not None and bottom is not None and top is not None:
-            section.append((at, bottom, top))
-            continue
-        if section:
-            outline[0].extend([*(each[0] for each in section), *(each[0] for each in reversed(section)), None])
-            outline[1].extend([*(each[1] for each in section), *(each[2] for each in reversed(section)), None])
-        section = []
-    style = {
-        "type": "scatter",
-        "mode": "lines",
-        "fill": "toself",
-        "fillcolor": "rgba(128,128,128,0.25)",
-        "line": {"width": 0},
-    }
-    return {**style, "name": "between the two", "x": outline[0], "y": outline[1], "hoverinfo": "skip"}
+    across: list[float | None] = []
+    along: list[float | None] = []
+    for drawn, section in groupby(zip(x, low, high, strict=True), lambda each: None not in each):
+        if drawn:
+            at, bottom, top = zip(*section, strict=True)
+            across += [*at, *at[::-1], None]
+            along += [*bottom, *top[::-1], None]
+    return {
+        "type": "scatter", "mode": "lines", "fill": "toself", "fillcolor": "rgba(128,128,128,0.25)",
+        "line": {"width": 0}, "name": "between the two", "x": across, "y": along, "hoverinfo": "skip",
+    }  # fmt: skip
 
 
 def _figure_trust(drawn: DrawnPath, bands: Bands) -> Figure:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from camcomp.compensation.program.compensate import Compensated
-from camcomp.compensation.program.trajectories import Trajectories
 from camcomp.compensation.program.under_control import mode_name
 from camcomp.compensation.program.verify import Verified
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
@@ -21,6 +21,7 @@ from camcomp.report.plot import (
     SMALLEST_UM,
     STYLES,
     Figure,
+    Json,
     axis,
     brief,
     broken,
@@ -32,6 +33,11 @@ from camcomp.report.plot import (
 )
 
 AXES = "xyz"
+FLOOR_UM = 1e-4  # below what a logarithmic axis can show
+TITLES = {
+    "target": "programmed", "chain_error": "chain errors alone", "force": "cutting force alone", "both": "both",
+    "adjusted": "commanded (adjusted)",
+}  # fmt: skip
 NO_ERROR_MM = 1e-6  # below it chain errors have no curve of their own
 
 
@@ -55,6 +61,25 @@ class DrawnPath:
         """Drawn row with the largest `size` (N,)."""
         return int(np.nanargmax(np.where(self.hidden | ~np.isfinite(size), -1.0, size)))
 
+    def curves(self, names: Sequence[str], values: Floats, decimals: int, least: float = -np.inf) -> list[Json]:
+        """Curves of the columns of values (N, k) along the path; least: the smallest value that the axis can show."""
+        index, gap = broken(thin(values), self.hidden)
+        s = gapped(self.s, index, gap, 4)
+        shown = [gapped(np.maximum(column, least), index, gap, decimals) for column in values.T]
+        return [line(name, s, y, i) for i, (name, y) in enumerate(zip(names, shown, strict=True))]
+
+    def errors(self, values: Floats, *names: str) -> list[Json]:
+        """Curves of errors (N, k) um on a logarithmic axis; the last column is what the control drives."""
+        return self.curves([*names, f"corrected, as the control drives it in {self.mode}"], values, 6, FLOOR_UM)
+
+
+def along_path(title: str, **more: Any) -> Json:
+    """Layout of a plot along the path, with the title of its vertical axis."""
+    return {"xaxis": axis("path length in mm"), "yaxis": axis(title, **more)}
+
+
+LOGARITHMIC: Json = {"type": "log", "dtick": 1, "exponentformat": "power"}
+
 
 def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
     """Everything that is drawn along the path."""
@@ -75,18 +100,12 @@ def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
     )  # fmt: skip
 
 
-def figure_trajectories(result: Compensated, found: Trajectories) -> Figure:
+def figure_trajectories(result: Compensated, curves: Mapping[str, Floats]) -> Figure:
     """Seed Fig. 4: target, the three trajectories of the original program, and the tip path to be commanded."""
-    target = result.rows.target
-    named = [
-        ("programmed", target),
-        ("chain errors alone", found.chain_error),
-        ("cutting force alone", found.force),
-        ("both", result.uncorrected),
-        ("commanded (adjusted)", result.written.end),
-    ]
-    if np.nanmax(np.abs(found.chain_error - target), initial=0.0) < NO_ERROR_MM:
-        named = [("programmed", target), ("original program under load", result.uncorrected), named[-1]]
+    target = curves["target"]
+    named = [(TITLES[name], points) for name, points in curves.items()]
+    if np.nanmax(np.abs(curves["chain_error"] - target), initial=0.0) < NO_ERROR_MM:
+        named = [named[0], ("original program under load", curves["both"]), named[-1]]
     rows = result.rows
     hidden = (rows.kind == RAPID) | ~rows.corrected
     index, gap = broken(thin(np.column_stack((target, result.uncorrected - target))), hidden)
@@ -123,17 +142,8 @@ def _planes(points: Floats) -> list[str]:
 
 def figure_error(drawn: DrawnPath, tolerance_um: float) -> Figure:
     """Tip error along the path, original and corrected program."""
-    index, gap = broken(thin(np.column_stack((drawn.before, drawn.after, drawn.driven))), drawn.hidden)
-    s = gapped(drawn.s, index, gap, 4)
-    floor = 1e-4  # um: below what the drawing can show on its logarithmic axis
-    curves = []
-    named = (
-        ("original program", drawn.before),
-        ("corrected program", drawn.after),
-        (f"corrected, as the control drives it in {drawn.mode}", drawn.driven),
-    )
-    for i, (name, size) in enumerate(named):
-        curves.append(line(name, s, gapped(np.maximum(size, floor), index, gap, 6), i))
+    values = np.column_stack((drawn.before, drawn.after, drawn.driven))
+    curves = drawn.errors(values, "original program", "corrected program")
     curves.append(level("tolerance", [float(drawn.s[0]), float(drawn.s[-1])], tolerance_um))
     a, b, c = (drawn.worst(each) for each in (drawn.before, drawn.after, drawn.driven))
     words = (
@@ -148,26 +158,20 @@ def figure_error(drawn: DrawnPath, tolerance_um: float) -> Figure:
         "At every end point stands the largest error on the move to it.",
         label=f"Plot of the tip error along the path: {words}.",
         traces=curves,
-        layout={
-            "xaxis": axis("path length in mm"),
-            "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power"),
-        },
+        layout=along_path("error in µm", **LOGARITHMIC),
     )
 
 
 def figure_shift(drawn: DrawnPath) -> Figure:
     """Commanded minus programmed tip along the path."""
     size = sizes(drawn.shift)
-    index, gap = broken(thin(drawn.shift), drawn.hidden)
-    s = gapped(drawn.s, index, gap, 4)
-    curves = [line(f"Δ{a}", s, gapped(drawn.shift[:, i], index, gap, 3), i) for i, a in enumerate(AXES)]
     at = drawn.worst(size)
     words = f"up to {micrometres(size[at])}, in source line {drawn.line[at]}"
     return Figure(
         name="shift", title="Shift of the commanded tip",
         caption=f"Commanded minus programmed tip in the program frame: {words}.",
-        label=f"Plot of the shift of the commanded tip in x, y and z along the path: {words}.", traces=curves,
-        layout={"xaxis": axis("path length in mm"), "yaxis": axis("shift in µm")},
+        label=f"Plot of the shift of the commanded tip in x, y and z along the path: {words}.",
+        traces=drawn.curves([f"Δ{a}" for a in AXES], drawn.shift, 3), layout=along_path("shift in µm"),
     )  # fmt: skip
 
 
@@ -183,9 +187,6 @@ def figures_actuators(drawn: DrawnPath, job: Job, *, drive: bool) -> list[Figure
 
 def _actuators(drawn: DrawnPath, names: tuple[str, ...], which: Ints, rotary: bool, drive: bool) -> Figure:
     values = (drawn.drive if drive else drawn.change)[:, which]
-    index, gap = broken(thin(values), drawn.hidden)
-    s = gapped(drawn.s, index, gap, 4)
-    curves = [line(names[a], s, gapped(values[:, i], index, gap, 3), i) for i, a in enumerate(which)]
     row = drawn.worst(np.abs(values).max(axis=1))
     column = int(np.abs(values[row]).argmax())
     if drive:
@@ -198,8 +199,8 @@ def _actuators(drawn: DrawnPath, names: tuple[str, ...], which: Ints, rotary: bo
     return Figure(
         name=f"{'drive' if drive else 'change'}-{'hinges' if rotary else 'slides'}", title=f"{what} along the path",
         caption=f"{note}: {words}.", label=f"Plot of {what.lower()} along the path, one curve per actuator: {words}.",
-        traces=curves,
-        layout={"xaxis": axis("path length in mm"), "yaxis": axis(f"{'drive' if drive else 'change'} in {unit}")},
+        traces=drawn.curves([names[a] for a in which], values, 3),
+        layout=along_path(f"{'drive' if drive else 'change'} in {unit}"),
     )  # fmt: skip
 
 

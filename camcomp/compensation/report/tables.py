@@ -5,7 +5,7 @@ Parquet files have a fifth of the size of CSV and full precision, and need pyarr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import BytesIO
 from typing import Any, BinaryIO
 
@@ -13,7 +13,6 @@ import numpy as np
 
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.totals import JointTableRows, Totals
-from camcomp.compensation.program.trajectories import Trajectories
 from camcomp.gcode.linear_rows import csv_rows
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError
@@ -124,16 +123,9 @@ def joint_bytes(result: Compensated, job: Job, name: str) -> bytes:
     return file.getvalue()
 
 
-def paths_csv(result: Compensated, trajectories: Trajectories) -> bytes:
+def paths_csv(result: Compensated, curves: Mapping[str, Floats]) -> bytes:
     """The five trajectories of the tool tip, program frame: seed Fig. 4."""
-    named = {
-        "target": result.rows.target,
-        "chain_error": trajectories.chain_error,
-        "force": trajectories.force,
-        "both": result.uncorrected,
-        "adjusted": result.written.end,
-    }
-    head = ["line", "s_mm"] + [f"{name}_{axis}_mm" for name in named for axis in "xyz"]
+    head = ["line", "s_mm"] + [f"{name}_{axis}_mm" for name in curves for axis in "xyz"]
     file = BytesIO()
-    CsvFile(file, head).rows(result.lines, np.column_stack((result.s, *named.values())))
+    CsvFile(file, head).rows(result.lines, np.column_stack((result.s, *curves.values())))
     return file.getvalue()
