@@ -96,12 +96,12 @@ def test_lines_stay_where_the_mode_is_only_assumed(orthoglide):
 def test_lines_stay_where_the_control_leaves_them_within_the_tolerance(orthoglide):
     free = compensated(orthoglide, circle(25.0, 3000), "G64")
     assert free.control.stated and not (free.rows.kind == ARC).any()
-    assert free.control.off_joins <= 1e-3 and free.control.after_s < 1.03 * free.control.before_s
+    assert free.control.off_joins <= 1e-3 and free.control.after_s < 1.03 * free.control.original.seconds
 
 
 def test_the_stops_of_g61_cost_what_the_lines_cost(orthoglide):
     lines = compensated(orthoglide, circle(25.0, 3000), "G61", arcs=False).control
-    assert lines.before_s < 5.0 and lines.after_s > 10.0
+    assert lines.original.seconds < 5.0 and lines.after_s > 10.0
     assert np.linalg.norm(lines.error, axis=1).max() < 1e-3
 
 
@@ -141,7 +141,7 @@ def test_a_program_without_any_correction_keeps_its_mode(tmp_path):
 def test_arcs_that_stay_as_programmed_keep_their_turns(arc):
     job = Job(load_config([shipped("config/cartesian.yaml"), shipped("config/no-force.yaml")]))
     done = compensated(job, ["G0 X15 Y0 Z0", f"{arc} I-15 J0 F1200"], "G64 P0.0005\n")
-    assert done.control.after_s == pytest.approx(done.control.before_s, rel=1e-9)
+    assert done.control.after_s == pytest.approx(done.control.original.seconds, rel=1e-9)
     assert 1e3 * np.linalg.norm(done.control.error, axis=1).max() <= 1.0  # um: what P0.0005 allows for, and its ends
 
 
@@ -181,7 +181,7 @@ def test_the_control_rests_between_cuts_and_joining_lines(orthoglide):
     done = compensated(orthoglide, circle(25.0, 3000), "G64")
     text = done.written.data.decode().splitlines()
     assert [each for each in text if each.startswith("G6")] == ["G64", "G61", "G64", "G61", "G64"]
-    assert done.control.resting == 4
+    assert done.control.rest.sum() == 4
     assert np.nanmax(sizes(done.control.error[done.control.points.joined])) <= 1e-3
     assert any(each.startswith("G61 is written at 4 ends") for each in Totals.of(done, orthoglide).warnings)
     read = read_program(done.written.data, name="out.nc", setup=setup_of(orthoglide.config))
@@ -207,7 +207,7 @@ def test_behind_a_joining_line_the_program_s_own_mode_is_in_force_again(orthogli
 
 def test_a_program_without_a_stated_mode_gets_none(orthoglide):
     done = compensated(orthoglide, rectangle(3000))
-    assert b"G61" not in done.written.data and done.control.resting == 0
+    assert b"G61" not in done.written.data and done.control.rest.sum() == 0
 
 
 @pytest.mark.parametrize(

@@ -47,15 +47,25 @@ class Piece(Text):
         return replace(super().place(index, column), line=self.row0 + index + 1)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class InterpretedRun:
-    """Lines for the interpreter."""
+    """Lines for the interpreter, collected one after the other."""
 
-    text: bytes
     row0: int
     state: ControlState  # in front of it
-    motions: int
     stated: list[bool]  # motion code and feed were stated between the motion in front of it and its first line
+    lines: list[bytes] = field(default_factory=list)
+    motions: int = 0
+
+    @property
+    def text(self) -> bytes:
+        """Its lines."""
+        return b"".join(self.lines)
+
+    def add(self, lines: bytes, motions: int) -> None:
+        """Add lines and the number of their motions."""
+        self.lines.append(lines)
+        self.motions += motions
 
 
 @dataclass(eq=False, kw_only=True)
@@ -90,28 +100,28 @@ class Runs:
 
     def __iter__(self) -> Iterator[LinearRun | InterpretedRun | bytes]:
         """Runs in order; bytes behind the program's end, as they are."""
-        held = _InterpretedLines()
+        held: InterpretedRun | None = None
         ended = False
         while not ended:
-            row, before = self._row, None if held.lines else self._state
-            found = self._linear(PROBE_MOTIONS if held.lines else RUN)
+            row, before = self._row, self._state
+            found = self._linear(RUN if held is None else PROBE_MOTIONS)
             if found is not None:
-                if held.lines and found.motions < PROBE_MOTIONS:
+                if held is not None and found.motions < PROBE_MOTIONS:
                     held.add(found.data[found.text_at : found.text_end].tobytes(), found.motions)
                     continue
-                if held.lines:
-                    yield held.take()
+                if held is not None:
+                    yield held
+                    held = None
                 yield found
                 continue
             line = self._next_line()
             if line is None:
                 break
-            if before is not None:
-                held.start(row, before.copy(), list(self._flags))
+            held = held or InterpretedRun(row, before.copy(), list(self._flags))
             motions, ended = self._interpret(line)
             held.add(line, motions)
-        if held.lines:
-            yield held.take()
+        if held is not None:
+            yield held
         if not self.motions:
             raise ProgramError("CC100", "the program moves nothing", at=Location(self.name, 1, 1))
         yield from self._rest()
@@ -252,30 +262,3 @@ class Runs:
             data=run.text, name=self.name, dialect=self.language.name, path=path, warnings=(), text=text, sites=sites,
             rebases=rebases, setup=self.setup, language=self.language, feed_point=self.feed_point, modes=modes, straight=True,
         )  # fmt: skip
-
-
-class _InterpretedLines:
-    """Collects the lines of an interpreted run."""
-
-    def __init__(self) -> None:
-        self.lines: list[bytes] = []
-        self._motions = 0
-        self._row0 = 0
-        self._state: ControlState | None = None
-        self._stated = [False, False]
-
-    def start(self, row0: int, state: ControlState, stated: list[bool]) -> None:
-        """The first line is going to be line row0; `state` in front of it, and what was `stated` since a motion."""
-        self._row0, self._state, self._stated = row0, state, stated
-
-    def add(self, lines: bytes, motions: int) -> None:
-        """Add lines and the number of their motions."""
-        self.lines.append(lines)
-        self._motions += motions
-
-    def take(self) -> InterpretedRun:
-        """Return the collected lines as a run, and start anew."""
-        assert self._state is not None
-        run = InterpretedRun(b"".join(self.lines), self._row0, self._state, self._motions, self._stated)
-        self.lines, self._motions, self._state = [], 0, None
-        return run

@@ -9,6 +9,7 @@ then two rounds of half the step about the best one.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import product
 from typing import Literal
 
@@ -44,9 +45,9 @@ class Placement(Result):
     z_mm: float
     turn_deg: float
     posture: str
-    judged_um: Size | None
-    before_max_um: Size | None
-    band_p95_um: Size | None
+    judged_um: Size | None = None
+    before_max_um: Size | None = None
+    band_p95_um: Size | None = None
     why: str = ""
     start_deg: dict[str, float] = Field(default_factory=dict)  # of the joints, in another posture than the stated one
 
@@ -145,9 +146,11 @@ class _Judge:
         x, y, turn, posture = place
         config = self.job.taken.into(placed(self.job.config, place, self.starts))
         job = replace(self.job, config=config)
-        where = {"x_mm": x, "y_mm": y, "z_mm": config.workpiece.origin_mm[2], "turn_deg": turn, "posture": posture,
-                 "start_deg": self.starts.get(posture, {})}  # fmt: skip
-        settings, nothing = config.compensation, {"judged_um": None, "before_max_um": None, "band_p95_um": None}
+        settings = config.compensation
+        placement = partial(
+            Placement, x_mm=x, y_mm=y, z_mm=config.workpiece.origin_mm[2], turn_deg=turn, posture=posture,
+            start_deg=self.starts.get(posture, {}),
+        )  # fmt: skip
         try:
             program = program_of(self.data, self.name, config)
             done = compensate(program, job, method=settings.method, tolerance_um=settings.tolerance_um, version="")
@@ -157,13 +160,12 @@ class _Judge:
             failed = [text for rule, text in totals.failed_checks(settings.tolerance_um) if rule == "CC602"]
             figures = totals.summary()
         except CamcompError as error:
-            return Placement.model_validate({**where, **nothing, "why": error.message})
+            return placement(why=error.message)
         if failed:
-            return Placement.model_validate({**where, **nothing, "why": failed[0]})
+            return placement(why=failed[0])
         band = figures.expected.p95_um if figures.expected is not None else None
         before = figures.before.max_um
-        sizes = {"judged_um": before if band is None else band, "before_max_um": before, "band_p95_um": band}
-        return Placement.model_validate({**where, **sizes})
+        return placement(judged_um=before if band is None else band, before_max_um=before, band_p95_um=band)
 
 
 def placed(config: Config, place: Try, starts: Mapping[str, dict[str, float]]) -> Config:

@@ -53,7 +53,6 @@ from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
-from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.progress import part as part_of_work
 from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import largest, sizes
@@ -97,25 +96,17 @@ class Compensated:
     moved: bool  # any of them leads elsewhere than programmed
     engaged: Engaged | None  # what the tool meets along the path
     bands: Bands | None = None  # None: every number of the config is exact
-    left: Floats | None = None  # (k, 3) mm of `after` that a policy leaves on purpose
+    missed: Floats  # (k, 3) mm of `after` without what a policy leaves on purpose
     orienting: Orienting | None = None  # how the program states the orientation of the tool; None: it does not
     tilt_after: Floats | None = None  # (k,) rad of the loaded platform where the tip is judged
     fraction: Floats | None = None  # (N,) of the motion at every end point
     interpolated: Interpolation | None = None  # None: every point was solved exactly
 
     @property
-    def missed(self) -> Floats:
-        """`after` (k, 3) mm minus the errors that the policy accepts."""
-        return self.after if self.left is None else self.after - self.left
-
-    @property
     def programmed_words(self) -> Floats:
         """Words (N, 3) of the program's orientation at every end point; only in programs with orientation."""
         assert self.fraction is not None and self.orienting is not None
-        turn, rows = self.program.path.orientation, self.rows
-        if turn is None:
-            return np.tile(UPRIGHT[self.orienting.form], (len(rows.piece), 1))
-        return turn.words(rows.motion, self.fraction)
+        return self.orienting.words(self.program.path, self.rows.motion, self.fraction)
 
     @property
     def lines(self) -> Ints:
@@ -162,13 +153,8 @@ class _Division:
     points: JudgedPoints
     commanded: Floats  # (k, 3) mm, of the written program
     after: Seen
-    left: Floats | None  # (k, 3) mm of the error that a policy leaves on purpose
-    worst: Floats  # (p,) mm, largest error beside that
-
-    @property
-    def missed(self) -> Floats:
-        """Errors (k, 3) mm minus those that the policy accepts."""
-        return self.after.error if self.left is None else self.after.error - self.left
+    missed: Floats  # (k, 3) mm of the error without what a policy leaves on purpose
+    worst: Floats  # (p,) mm, largest of these
 
 
 @dataclass(eq=False, kw_only=True)
@@ -221,8 +207,8 @@ class _Correction:
         correction = curve - track.points(trial.piece, trial.w)
         self.kept = _kept(track, trial, correction, 0.5 * self.step)
         if self.orienting is not None:
-            lengths = self.orienting.lengths(self.aimed.words, 1e-3 * self.tolerance_um)
-            curve = np.column_stack((curve, lengths))
+            length = self.orienting.length(1e-3 * self.tolerance_um)
+            curve = np.column_stack((curve, self.aimed.words * length))
             self.kept &= self.orienting.kept(track, trial, self.aimed.words)
         self.second = second_derivative(trial, curve)
         most = _largest(track, trial, sizes(correction))
@@ -352,7 +338,7 @@ class _Correction:
             bend.use[nodes.piece[to[wrong]]] = False
         if self.orienting is None:
             return commanded, circles, None
-        turned = self.orienting.from_lengths(shift[:, 3:], 1e-3 * self.tolerance_um)
+        turned = shift[:, 3:] / self.orienting.length(1e-3 * self.tolerance_um)
         return commanded, circles, aimed.words[~middle] + turned
 
     def _written(self, nodes: Nodes, commanded: Floats, circles: Arcs, words: Floats | None) -> _Division:
@@ -365,16 +351,18 @@ class _Correction:
         written = self._rewritten(rows)
         points = judged_points(job, track, rows, self.feeding & ~self.pushed)
         told = points.along(written.end, replace(rows.arcs, centre=written.centre))
-        after, left = see(job, points, told, self.orienting, written.words), None
+        after = see(job, points, told, self.orienting, written.words)
+        missed = after.error
         if self.shares is not None:
-            left = self.shares.left(job, track, points.piece, points.w, travel=points.travel, before=points.before)
-        missed = after.error if left is None else after.error - left
+            missed = missed - self.shares.left(job, track, points.piece, points.w, points.travel, points.before)
         size = np.where(after.status == 0, sizes(missed), np.inf)
         if after.tilt is not None:
             size = np.maximum(size, np.nan_to_num(after.tilt) * self.goal[points.piece] / MOST_TILT_RAD)
         worst = np.zeros(len(self.goal))
         np.maximum.at(worst, points.piece[points.judged], size[points.judged])
-        return _Division(rows=rows, written=written, points=points, commanded=told, after=after, left=left, worst=worst)
+        return _Division(
+            rows=rows, written=written, points=points, commanded=told, after=after, missed=missed, worst=worst
+        )
 
     def _rewritten(self, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Rewritten:
         return rewrite(
@@ -411,7 +399,7 @@ class _Correction:
             iterations=self.aimed.iterations, method=self.method, without_spindle=still, warnings=warnings,
             feeds=int(np.count_nonzero(np.diff(track.motion[self.feeding], prepend=-1))),
             moved=not self.kept[self.feeding].all(), engaged=track.engaged,
-            bands=self._bands(found, before, written), left=None if found.left is None else found.left[judged],
+            bands=self._bands(found, before, written), missed=found.missed.take(judged, axis=0),
             orienting=self.orienting, tilt_after=None if after.tilt is None else after.tilt[judged],
             fraction=track.u(rows.piece, rows.w),
         )  # fmt: skip

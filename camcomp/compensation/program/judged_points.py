@@ -125,15 +125,19 @@ def see(
     job: Job, points: JudgedPoints, told: Floats, orienting: Orienting | None = None, words: Floats | None = None
 ) -> Seen:
     """The loaded machine at commanded points (k, 3) mm, program frame; words (N, 3): of the orientation at end points."""
-    if orienting is not None and words is not None:
-        return _see_oriented(job, points, told, orienting, words)
-    if points.near is not None:
+    if points.near is not None:  # of machines that do not turn the tool
         commanded = job.frame.to_machine(told)
         state, tip = points.near.state(commanded), job.frame.to_program(points.near.tips(commanded))
         return Seen(tip - points.target, points.near.status, tip.compress(points.end, axis=0), state)
-    masses_at = points.target if job.causes else None  # masses move with the target
-    tip, state = respond(job, told, points.travel, masses_at, before=points.before)
-    return _seen(points, tip, state)
+    travel, tilt = commanded_travel(points, orienting, words), None
+    masses_at = points.target if job.causes or words is not None else None  # masses move with the target
+    tip, state = respond(job, told, travel, masses_at, before=points.before)
+    if orienting is not None and words is not None and travel.rotation is not None:
+        programmed = points.travel.rotation
+        if programmed is None:
+            programmed = np.broadcast_to(job.machine.nominal.held_rotation, (len(points.row), 3, 3))
+        tilt = orienting.tilt(travel.rotation, state, programmed)
+    return _seen(points, tip, state, tilt)
 
 
 def commanded_travel(points: JudgedPoints, orienting: Orienting | None, words: Floats | None) -> Travel:
@@ -142,16 +146,6 @@ def commanded_travel(points: JudgedPoints, orienting: Orienting | None, words: F
         return points.travel
     before = np.array(UPRIGHT[orienting.form])  # the first move begins outside of the judged points
     return orienting.told(points.travel, orienting.along(words, before, points.row, points.fraction))
-
-
-def _see_oriented(job: Job, points: JudgedPoints, told: Floats, orienting: Orienting, words: Floats) -> Seen:
-    row, travel = points.row, commanded_travel(points, orienting, words)
-    assert travel.rotation is not None
-    tip, state = respond(job, told, travel, points.target, before=points.before)
-    programmed = points.travel.rotation
-    if programmed is None:
-        programmed = np.broadcast_to(job.machine.nominal.held_rotation, (len(row), 3, 3))
-    return _seen(points, tip, state, orienting.tilt(travel.rotation, state, programmed))
 
 
 def _seen(points: JudgedPoints, tip: Floats, state: Correction, tilt: Floats | None = None) -> Seen:

@@ -60,15 +60,13 @@ class Orienting:
 
     def programmed(self, track: Track, piece: Ints, w: Floats) -> Floats:
         """Words (k, 3) of the program at fractions w (k,) of pieces (k,)."""
-        if track.path.orientation is None:
-            return np.tile(UPRIGHT[self.form], (len(piece), 1))
-        return track.path.orientation.words(track.motion[piece], track.u(piece, w))
+        return self.words(track.path, track.motion[piece], track.u(piece, w))
 
-    def of_moves(self, path: Path, move: Ints, f: Floats) -> Floats:
-        """Orientations (k, 3, 3) of the platform, machine frame, at fractions f (k,) of moves (k,) of a path."""
+    def words(self, path: Path, motion: Ints, u: Floats) -> Floats:
+        """Words (k, 3) of a path at fractions u (k,) of motions (k,)."""
         if path.orientation is None:
-            return self.platform(np.tile(UPRIGHT[self.form], (len(move), 1)))
-        return self.platform(path.orientation.words(move, f))
+            return np.tile(UPRIGHT[self.form], (len(motion), 1))
+        return path.orientation.words(motion, u)
 
     def platform(self, words: Floats) -> Floats:
         """Orientations (k, 3, 3) of the platform, machine frame."""
@@ -132,13 +130,9 @@ class Orienting:
         out: Bools = most <= TILT_RAD
         return out
 
-    def lengths(self, words: Floats, budget_mm: float) -> Floats:
-        """Words (k, 3) as lengths, so that a miss of TILT_RAD weighs as much as one of the budget, mm."""
-        return words * (budget_mm / TILT_RAD / (1.0 if self.form == VECTOR else DEGREES_PER_RAD))
-
-    def from_lengths(self, lengths: Floats, budget_mm: float) -> Floats:
-        """The inverse of `lengths`."""
-        return lengths / (budget_mm / TILT_RAD / (1.0 if self.form == VECTOR else DEGREES_PER_RAD))
+    def length(self, budget_mm: float) -> float:
+        """Length, mm, of a unit of a word by which a miss of TILT_RAD weighs as much as one of the budget, mm."""
+        return budget_mm / TILT_RAD / (1.0 if self.form == VECTOR else DEGREES_PER_RAD)
 
     def along(self, ends: Floats, before: Floats, row: Ints, fraction: Floats) -> Floats:
         """Words (k, 3) at fractions (k,) of the moves to words `ends` (N, 3), the first of which begins at `before` (3,)."""

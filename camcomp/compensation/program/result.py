@@ -16,6 +16,16 @@ from camcomp.model.job import Job
 WORSE_SHARE = 0.01  # by which the largest error may grow (contract, section 4)
 
 
+class Figures(Result):
+    """Base of figures some of which are only stated where they exist: keys that were not set are omitted in JSON."""
+
+    model_config = ConfigDict(json_schema_serialization_defaults_required=False)
+
+    def as_json(self) -> dict[str, Any]:
+        """The result as a mapping of JSON types."""
+        return self.model_dump(mode="json", exclude_unset=True)
+
+
 class ErrorSize(Result):
     """Distance of the loaded tip from the programmed one."""
 
@@ -137,10 +147,8 @@ Band = Annotated[tuple[BandShare, ...] | None, Field(description="the largest sh
 Advice = Annotated[str | None, Field(description="what would make the band smaller")]
 
 
-class Summary(Result):
+class Summary(Figures):
     """The figures of `camcomp compensate`; angles and torques where a machine has hinges, `interpolation` of long programs."""
-
-    model_config = ConfigDict(json_schema_serialization_defaults_required=False)
 
     points: Annotated[int, Field(description="end points of the corrected program")]
     segments_in: Annotated[int, Field(description="motions of the program")]
@@ -172,19 +180,13 @@ class Summary(Result):
     interpolation: Annotated[Interpolation | None, Field(description="null where no point was interpolated")] = None
     warnings: list[str]
 
-    def as_json(self) -> dict[str, Any]:
-        """As a mapping for JSON; keys that were not set are omitted."""
-        return self.model_dump(mode="json", exclude_unset=True)
 
-
-class LineResult(Result):
+class LineResult(Figures):
     """Residual of one source line in um, and its parts.
 
     convergence: what the solver itself leaves. rounding: half the last digit written, worst case. vertex: end points
     of moves, where rounding and the sharing of the chord's miss show. chord: what the straight lines between them add.
     """
-
-    model_config = ConfigDict(json_schema_serialization_defaults_required=False)
 
     line: int
     moves: int
@@ -201,10 +203,8 @@ class LineResult(Result):
         return self.residual_um if self.missed_um is None else self.missed_um
 
 
-class Verification(Result):
+class Verification(Figures):
     """The figures of `camcomp verify`."""
-
-    model_config = ConfigDict(json_schema_serialization_defaults_required=False)
 
     tolerance_um: float
     residual: ErrorSize
@@ -220,7 +220,3 @@ class Verification(Result):
     band: Band = None
     advice: Advice = None
     lines: tuple[LineResult, ...]
-
-    def as_json(self) -> dict[str, Any]:
-        """As a mapping for JSON; keys that were not set are omitted."""
-        return self.model_dump(mode="json", exclude_unset=True)

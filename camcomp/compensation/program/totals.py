@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.compensation.bands.outcome import Bands, BandTotals, band_figures
+from camcomp.compensation.bands.outcome import BandTotals, band_figures
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.control_account import ControlAccount
 from camcomp.compensation.program.result import (
-    CycleTime,
     ErrorSum,
     Interpolation,
     Summary,
@@ -18,7 +17,7 @@ from camcomp.compensation.program.result import (
     job_figures,
     worse_than_before,
 )
-from camcomp.compensation.program.under_control import control_warnings, merging, mode_name
+from camcomp.compensation.program.under_control import control_figures, control_warnings, merging
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode
@@ -97,7 +96,7 @@ class Totals:
 
     def add(self, result: Compensated, own: slice = slice(None), part: Part | None = None) -> JointTableRows:
         """Add the motions `part` of a result, None: of a whole program; own: their rows."""
-        path = result.program.path
+        path, state, out = result.program.path, result.state, self._rows(result, own)
         self._add_control(result, own, part)
         path, engaged = path if part is None else path.take(slice(part.first, part.last)), result.engaged
         self.motions, self.method = self.motions + len(path), result.method
@@ -109,7 +108,18 @@ class Totals:
         self._found |= dict.fromkeys(result.warnings)
         self._feeds, self._moved = self._feeds + result.feeds, self._moved or result.moved
         self._still += result.without_spindle[: MOST_LINES + 1 - len(self._still)].tolist()
-        return self.add_exact(result, own)
+        corrected = result.rows.corrected[own]
+        self.points += len(out.line)
+        self.joins += int(result.rows.joining[own].sum())
+        self.change = np.fmax(self.change, _largest(out.joints - out.nominal, corrected))
+        self.force = np.fmax(self.force, _largest(out.drive, corrected))
+        self.tilt = float(np.fmax.reduce(sizes(state.tilt[own])[corrected], initial=self.tilt))
+        for total, error in ((self.before, result.before), (self.after, result.after), (self.missed, result.missed)):
+            total.add(error)
+        self._add_beyond(out)
+        self.iterations = max(self.iterations, result.iterations)
+        self.step_mm = max(self.step_mm, result.program.step_mm(self.job.config.control.resolution_mm))
+        return out
 
     def _add_control(self, result: Compensated, own: slice, part: Part | None) -> None:
         """Plan the moves as the controller does."""
@@ -117,7 +127,7 @@ class Totals:
         self.modes |= dict.fromkeys(control.modes)
         if control.apart:
             self._apart |= dict.fromkeys(mode for mode in control.modes if merging(mode, language))
-        self._resting += control.resting
+        self._resting += int(control.rest.sum())
         if part is None:
             self._accounts = control.original, control.account
             return
@@ -141,67 +151,45 @@ class Totals:
             self.warnings.append(below_step_warning(self._name, self._feeds, self.step_mm))
         self.warnings += self._found
 
-    def add_exact(self, result: Compensated, own: slice = slice(None)) -> JointTableRows:
-        """Add rows `own` of a result that was corrected exactly."""
+    def _rows(self, result: Compensated, own: slice) -> JointTableRows:
+        """Rows `own` of a result, behind those before."""
         rows, state, first = result.rows, result.state, own.start or 0
         s0, t0 = (result.s[first - 1], result.t[first - 1]) if first else (0.0, 0.0)
         s, t = self._s + result.s[own] - s0, self._t + result.t[own] - t0
         self._s, self._t = float(s[-1]), float(t[-1])
-        words = None
-        if result.orienting is not None and result.written.words is not None:
-            both = (result.programmed_words[own], result.written.words[own])
-            words = np.column_stack([angles_of(result.orienting.form, each) for each in both])
-        out = JointTableRows(
+        return JointTableRows(
             line=result.lines[own], s=s, t=t, target=rows.target[own], written=result.written.end[own],
             force=result.force[own], nominal=result.nominal[own], joints=state.rho[own], drive=state.drive[own],
-            behind=self._behind(self._columns(result.bands, own), rows.engagement[own], words),
+            behind=self._behind(result, own),
         )  # fmt: skip
-        self._add(
-            out, joining=rows.joining[own], corrected=rows.corrected[own], tilt=state.tilt[own], before=result.before,
-            after=result.after, missed=result.missed,
-        )  # fmt: skip
-        self.iterations = max(self.iterations, result.iterations)
-        self.step_mm = max(self.step_mm, result.program.step_mm(self.job.config.control.resolution_mm))
-        return out
 
-    def _add(
-        self, rows: JointTableRows, *, joining: Bools, corrected: Bools, tilt: Floats, before: Floats, after: Floats,
-        missed: Floats,
-    ) -> None:  # fmt: skip
-        """Add rows (N,), and errors (k, 3) mm between them."""
-        self.points += len(rows.line)
-        self.joins += int(joining.sum())
-        self.change = np.fmax(self.change, _largest(rows.joints - rows.nominal, corrected))
-        self.force = np.fmax(self.force, _largest(rows.drive, corrected))
-        self.tilt = float(np.fmax.reduce(sizes(tilt)[corrected], initial=self.tilt))
-        self.before.add(before)
-        self.after.add(after)
-        self.missed.add(missed)
+    def _behind(self, result: Compensated, own: slice) -> Floats | None:
+        """Columns behind the others, if the table needs them: bands, with a stock the engagement, words of the orientation."""
+        bands, parts = result.bands, []
+        if bands is not None:
+            self.bands = bands.totals if self.bands is None else self.bands.join(bands.totals)
+        if not self._tabled:
+            return None
+        if bands is not None:
+            parts.append(bands.columns(with_share=self.job.config.compensation.policy != "full")[own])
+        if self.job.config.workpiece.stock is not None:
+            parts.append(result.rows.engagement[own])
+        if result.orienting is not None and result.written.words is not None:
+            both = (result.programmed_words[own], result.written.words[own])
+            parts += [angles_of(result.orienting.form, each) for each in both]
+        return np.column_stack(parts) if parts else None
+
+    def _add_beyond(self, rows: JointTableRows) -> None:
+        """Note the lines on which actuators leave their travel."""
         for a, (low, high) in enumerate(self.job.machine.limits):
             over = np.flatnonzero((rows.joints[:, a] < low) | (rows.joints[:, a] > high))
             if len(over) and len(self._beyond[a]) <= MOST_LINES:
                 lines = np.unique(rows.line[over])[: MOST_LINES + 1]
                 self._beyond[a] = sorted({*self._beyond[a], *lines.tolist()})[: MOST_LINES + 1]
 
-    def _columns(self, bands: Bands | None, own: slice = slice(None)) -> Floats | None:
-        """Add the expected error of a part; return the band columns of its own rows if the table needs them."""
-        if bands is None:
-            return None
-        self.bands = bands.totals if self.bands is None else self.bands.join(bands.totals)
-        if not self._tabled:
-            return None
-        return bands.columns(with_share=self.job.config.compensation.policy != "full")[own]
-
-    def _behind(self, bands: Floats | None, engagement: Floats | None, words: Floats | None = None) -> Floats | None:
-        """Columns behind the others: bands, with a stock the engagement, words of the orientation."""
-        stock = engagement if self.job.config.workpiece.stock is not None else None
-        parts = [each for each in (bands, stock, words) if each is not None]
-        return np.column_stack(parts) if parts else None
-
     def summary(self) -> Summary:
         """The figures of the program."""
         rotary = self.job.machine.revolute
-        before, after = (each.seconds + self.waiting_s for each in self._accounts)
         tilt, policy = self.tilt_after, self.job.config.compensation.policy
         figures = {
             "points": self.points,
@@ -220,10 +208,7 @@ class Totals:
             "platform_tilt_max_mrad": 1e3 * self.tilt,
             "tilt_after_mrad": None if tilt is None else 1e3 * tilt,
             "joining_lines": self.joins,
-            "cycle_time_s": CycleTime(before=before, after=after),
-            "control_mode": mode_name(tuple(self.modes)),
-            "control_mode_stated": all(each.stated for each in self.modes),
-            "under_control": self._accounts[1].errors.figures(),
+            **control_figures(tuple(self.modes), self._accounts, (self.waiting_s, self.waiting_s)),
             **({} if self.bands is None else band_figures(self.bands, policy)),
             "interpolation": self.interpolated,
             "warnings": self.warnings,

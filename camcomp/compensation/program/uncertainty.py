@@ -47,26 +47,13 @@ class Uncertainty:
         free (n,): points that carry no cutting force, whatever the track says. base (n, 3): the loaded tips themselves, before
         (3,): the commanded tip in front of them; both for machines with effects and programs with orientation only.
         """
-        if self.job.causes or travel.rotation is not None:
-            return self._anew(piece, w, commanded=commanded, travel=travel, free=free, base=base, before=before)
-        changes = [
-            [self._force(one, piece, w, free) - travel.force for one in each.sides] if each.moves_force else []
-            for each in self.inputs
-        ]
-        return self._field.moves(commanded, travel.force, changes)
-
-    def _anew(
-        self,
-        piece: Ints,
-        w: Floats,
-        *,
-        commanded: Floats,
-        travel: Travel,
-        free: Bools,
-        base: Floats,
-        before: Floats | None,
-    ) -> TipMoves:
-        """The whole way anew for every side of every input: drives remember their way, and a field knows no orientation."""
+        if not self.job.causes and travel.rotation is None:
+            changes = [
+                [self._force(one, piece, w, free) - travel.force for one in each.sides] if each.moves_force else []
+                for each in self.inputs
+            ]
+            return self._field.moves(commanded, travel.force, changes)
+        # Drives remember their way, and a field knows no orientation: the whole way anew for every side of every input.
         slope, bend = np.zeros((2, len(piece), 3, len(self.inputs)))
         for j, each in enumerate(self.inputs):
             tips = []

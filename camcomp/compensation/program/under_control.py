@@ -79,11 +79,6 @@ class UnderControl:
         return ControlAccount.of(self.programmed, self.limits)
 
     @property
-    def before_s(self) -> float:
-        """Execution time of the program."""
-        return self.original.seconds
-
-    @property
     def error(self) -> Floats:
         """Errors (k, 3) mm at the points."""
         return self.account.latest
@@ -92,11 +87,6 @@ class UnderControl:
     def after_s(self) -> float:
         """Execution time of the written program."""
         return self.account.seconds
-
-    @property
-    def resting(self) -> int:
-        """Number of end points at which the control rests because of a joining line."""
-        return int(self.rest.sum())
 
     @property
     def stated(self) -> bool:
@@ -119,15 +109,8 @@ class UnderControl:
     def leaves_room(self, tolerance_um: float) -> bool:
         """Whether another way to write the program might be faster or nearer to the path."""
         return self.stated and (
-            self.after_s > LOST_TIME * self.before_s or 1e3 * self.off_joins > tolerance_um * (1.0 + 1e-9)
+            self.after_s > LOST_TIME * self.original.seconds or 1e3 * self.off_joins > tolerance_um * (1.0 + 1e-9)
         )
-
-
-def rests_of(cut: Bools, joining: Bools) -> Bools:
-    """End points (N,) between a cut and a joining line; cut, joining (N,): what the moves to the end points are."""
-    out = np.zeros(len(cut), np.bool_)
-    out[:-1] = cut[:-1] & joining[1:] | joining[:-1] & cut[1:]
-    return out
 
 
 def rounds(mode: PathMode, tolerance_um: float) -> bool:
@@ -146,7 +129,8 @@ def rests(program: Program, rows: CorrectedRows, tolerance_um: float, part: Part
     change = np.flatnonzero(np.diff(which))
     free[1 + change] &= np.array([modes[which[k]] == modes[which[k + 1]] for k in change], bool)
     cut = (rows.kind != RAPID) & ~rows.joining & rows.corrected
-    out: Bools = rests_of(cut, rows.joining) & free[rows.motion]
+    between = cut[:-1] & rows.joining[1:] | rows.joining[:-1] & cut[1:]
+    out: Bools = np.append(between, np.zeros(min(len(cut), 1), np.bool_)) & free[rows.motion]
     if part is not None:
         out &= (rows.motion >= part.first) & (np.append(rows.motion[1:], part.last) < part.last)
     return out
@@ -312,12 +296,17 @@ def of_text(
         ControlAccount.of(programmed_moves(original, job), limits),
         ControlAccount.of(programmed_moves(corrected, job), limits, points=points),
     ]
-    before, after = (
-        account.seconds + waiting_s(job.config, each.dwelt_s, each.tool_changes)
-        for account, each in zip(accounts, (original, corrected), strict=True)
-    )
     path = original.path
     modes = modes_of(original.modes, np.flatnonzero((path.kind != RAPID) & ~path.machine))
+    waits = [waiting_s(job.config, each.dwelt_s, each.tool_changes) for each in (original, corrected)]
+    return control_figures(modes, accounts, waits)
+
+
+def control_figures(
+    modes: tuple[PathMode, ...], accounts: Sequence[ControlAccount], waits: Sequence[float]
+) -> dict[str, Any]:
+    """Figures of the accounts before and after compensation, with the time, s, that the control waits besides the moves."""
+    before, after = (account.seconds + wait for account, wait in zip(accounts, waits, strict=True))
     return {
         "cycle_time_s": CycleTime(before=before, after=after),
         "control_mode": mode_name(modes),

@@ -14,7 +14,7 @@ import numpy as np
 from camcomp.compensation.bands.outcome import BandTotals, band_figures
 from camcomp.compensation.program.chords import trial_nodes
 from camcomp.compensation.program.load_turns import load_turns
-from camcomp.compensation.program.matching import match_moves
+from camcomp.compensation.program.matching import Matching
 from camcomp.compensation.program.moves import (
     WITHIN_RAPID,
     corrected_pieces,
@@ -91,9 +91,11 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     step = sizes(begin - np.concatenate((original.path.start[:1], expected[:-1])))
     layout = row_layout(original.path, track, step, original.step_mm(job.config.control.resolution_mm))
     reach, foreign = asked.reach(), _other_model(corrected, job)
-    first, last, joins = match_moves(
-        corrected.path, track, expected, reach, layout, stamped=is_stamped(corrected.data), foreign=bool(foreign)
-    )
+    matching = Matching(
+        path=corrected.path, track=track, expected=expected, reach=reach, layout=layout,
+        stamped=is_stamped(corrected.data),
+    )  # fmt: skip
+    first, last, joins = matching.match(foreign=bool(foreign))
     moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
     points = _Points.of(asked, corrected.path, *_samples(corrected.path, moving, first[moving], last[moving]))
     guess = points.fraction(reach)
@@ -116,7 +118,7 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     return Verified(
         residual=residual[judged], lines=points.by_line(w, judged, residual, missed), joining=joins, control=control,
         warnings=[*original.warnings, *foreign], missed=missed, totals=totals, policy=job.config.compensation.policy,
-        stamped=is_stamped(corrected.data),
+        stamped=matching.stamped,
     )  # fmt: skip
 
 
@@ -210,7 +212,8 @@ class _Points:
     @classmethod
     def of(cls, asked: _Programmed, path: Path, piece: Ints, move: Ints, f: Floats) -> _Points:
         """Points of the corrected path."""
-        rotation = None if asked.orienting is None else asked.orienting.of_moves(path, move, f)
+        turning = asked.orienting
+        rotation = None if turning is None else turning.platform(turning.words(path, move, f))
         told = path_geometry.points(path, move, f)
         return cls(asked=asked, path=path, piece=piece, move=move, f=f, commanded=told, rotation=rotation)
 

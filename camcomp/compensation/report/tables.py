@@ -118,7 +118,7 @@ def joint_bytes(result: Compensated, job: Job, name: str) -> bytes:
     """The joint table of a program that was corrected as a whole."""
     file = BytesIO()
     table = JointTable(file, name, job, result.orienting is not None)
-    table.add(Totals(job).add_exact(result))
+    table.add(Totals(job).add(result))
     table.close()
     return file.getvalue()
 
