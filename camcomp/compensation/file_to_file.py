@@ -114,8 +114,8 @@ def _in_pieces(
     source: BinaryIO, name: str, job: Job, settings: CorrectionSettings, outputs: OpenOutputs
 ) -> Totals | None:
     """`compensate_into` for a long program; None if it has to be corrected as a whole."""
-    from camcomp.compensation.long.linear_run import NotInPieces
     from camcomp.compensation.long.program import LongProgram
+    from camcomp.compensation.long.runs import NotInPieces
     from camcomp.model.control import setup_of
 
     table = None

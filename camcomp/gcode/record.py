@@ -42,6 +42,7 @@ class Recorder:
         self._count = 0
         self._numbers = array("d")  # NUMBERS per motion
         self._spans = array("i")  # 26 per motion
+        self._blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # earlier motions, as in `_finished`
         self._line_first = 0
         self.code_stated = False
         self.feed_stated = False
@@ -182,21 +183,22 @@ class Recorder:
     def linear_motions(self, row: int, found: LinearMotions, state: ControlState) -> None:
         """Motions of linear moves, the first of which is line `row`; state: that in front of them."""
         n = len(found.row)
-        numbers = np.zeros((n, NUMBERS))
-        numbers[:, 0], numbers[:, 1], numbers[:, 2] = row + found.row, found.kind, found.kind != RAPID
-        numbers[:, 3:6], numbers[:, 6:9], numbers[:, 9:12] = found.start, found.end, math.nan
-        numbers[:, 13] = np.where(found.kind == RAPID, math.nan, found.feed)
-        numbers[:, 14:20] = (state.speed, state.tool, state.unit, *state.offset)
+        numbers = np.zeros((NUMBERS, n))
+        numbers[0], numbers[1], numbers[2] = row + found.row, found.kind, found.kind != RAPID
+        numbers[3:6], numbers[6:9], numbers[9:12] = found.start.T, found.end.T, math.nan
+        numbers[13] = np.where(found.kind == RAPID, math.nan, found.feed)
+        numbers[14:20] = np.array((state.speed, state.tool, state.unit, *state.offset))[:, None]
         flags = 2 | state.centre_absolute << 3 | found.code_stated.astype(int) << 4 | found.feed_stated.astype(int) << 5
-        flags |= ((found.begin[:, :3] >= 0) << np.array([8, 9, 10])).sum(axis=1)
-        numbers[:, 20:22], numbers[:, 22], numbers[:, 23] = (state.plane, state.feed_mode), flags, found.feed
-        numbers[:, 24], numbers[0, 25], numbers[:, 26] = state.sense, state.waits, state.feed_unit
-        numbers[:, 27:30] = numbers[:, 30:33] = state.turns_to
-        numbers[0, 27:30] = state.turned
-        spans = np.full((n, len(LETTERS), 2), -1, np.int32)
-        spans[:, :LINEAR] = np.stack((found.begin, found.finish), axis=2)
-        self._numbers.frombytes(numbers.tobytes())
-        self._spans.frombytes(spans.tobytes())
+        for axis in range(3):
+            flags |= (found.begin[:, axis] >= 0).astype(int) << 8 + axis
+        numbers[20], numbers[21], numbers[22], numbers[23] = state.plane, state.feed_mode, flags, found.feed
+        numbers[24], numbers[25, 0], numbers[26] = state.sense, state.waits, state.feed_unit
+        numbers[27:33] = np.array((*state.turns_to, *state.turns_to))[:, None]
+        numbers[27:30, 0] = state.turned
+        begin, finish = np.full((2, n, len(LETTERS)), -1, np.int32)
+        begin[:, :LINEAR], finish[:, :LINEAR] = found.begin, found.finish
+        self._end_block()
+        self._blocks.append((numbers, begin, finish))
         self.modes += [state.path_mode] * n
         self._count += n
         state.turned, state.waits = state.turns_to, False
@@ -207,62 +209,75 @@ class Recorder:
             self._fixed.append(self._line_first)
         self.cycles[self._line_first] = (list(actions), irreplaceable)
 
-    def _orientation(self, a: np.ndarray) -> orientation.Orientation | None:
-        """Words of the orientation by motion; None for a program that has no such words."""
-        if self.oriented is None:
-            return None
-        return orientation.Orientation(self.oriented, frozen(a[:, 27:30]), frozen(a[:, 30:33]))
+    def _end_block(self) -> None:
+        """Put the motions that were recorded one by one behind the blocks."""
+        if len(self._numbers):
+            spans = np.frombuffer(self._spans, np.int32).reshape(-1, len(LETTERS), 2)
+            numbers = np.frombuffer(self._numbers, float).reshape(-1, NUMBERS).T
+            self._blocks.append((numbers, spans[:, :, 0], spans[:, :, 1]))
+            self._numbers, self._spans = array("d"), array("i")
+
+    def _finished(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Numbers (NUMBERS, n) of the motions, first and last index (n, 13) of their words."""
+        self._end_block()
+        if len(self._blocks) == 1:
+            return self._blocks[0]
+        none = np.zeros((0, len(LETTERS)), np.int32)
+        numbers, begin, finish = zip((np.zeros((NUMBERS, 0)), none, none), *self._blocks, strict=True)
+        return np.concatenate(numbers, axis=1), np.concatenate(begin), np.concatenate(finish)
 
     def finish(self) -> tuple[Path, Sites]:
         """All motions as arrays."""
         n = self._count
-        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, NUMBERS))
-        spans = np.frombuffer(self._spans, np.int32).reshape(n, 13, 2) if n else np.zeros((0, 13, 2), np.int32)
-        kind = a[:, 1].astype(np.int8)
-        flags = a[:, 22].astype(np.int64)
-        plane = a[:, 20].astype(np.int8)
+        a, begin, finish = self._finished()
+        turning = None
+        if self.oriented is not None:
+            turning = orientation.Orientation(self.oriented, frozen(a[27:30].T), frozen(a[30:33].T))
+        kind = a[1].astype(np.int8)
+        flags = a[22].astype(np.int64)
+        plane = a[20].astype(np.int8)
         axis = np.zeros((n, 3))
         for number, (_, _, w) in PLANES.items():
             axis[(kind == ARC) & (plane == number), w] = 1.0
         path = Path(
-            line=a[:, 0].astype(np.int64) + 1,
+            line=a[0].astype(np.int64) + 1,
             kind=kind,
-            start=a[:, 3:6],
-            end=a[:, 6:9],
-            centre=a[:, 9:12],
+            start=a[3:6].T,
+            end=a[6:9].T,
+            centre=a[9:12].T,
             axis=axis,
-            angle=a[:, 12],
-            feed=a[:, 13],
-            speed=a[:, 14],
-            turn=a[:, 24],
-            tool=a[:, 15].astype(np.int64),
+            angle=a[12],
+            feed=a[13],
+            speed=a[14],
+            turn=a[24],
+            tool=a[15].astype(np.int64),
             known=(flags & 2) > 0,
             machine=(flags & 1) > 0,
-            waits=a[:, 25] > 0,
-            orientation=self._orientation(a),
+            waits=a[25] > 0,
+            orientation=turning,
         )
         fixed = np.zeros(n, bool)
         fixed[self._fixed] = True
         sites = Sites(
-            row=frozen(a[:, 0], np.int64),
-            begin=frozen(spans[:, :, 0], np.int32),
-            finish=frozen(spans[:, :, 1], np.int32),
-            unit=frozen(a[:, 16]),
-            feed_unit=frozen(a[:, 26]),
-            offset=frozen(a[:, 17:20]),
+            row=frozen(a[0], np.int64),
+            begin=frozen(begin, np.int32),
+            finish=frozen(finish, np.int32),
+            unit=frozen(a[16]),
+            feed_unit=frozen(a[26]),
+            offset=frozen(a[17:20].T),
             relative=frozen((flags & 4) > 0, np.bool_),
             centre_absolute=frozen((flags & 8) > 0, np.bool_),
-            code=frozen(a[:, 2], np.int8),
+            code=frozen(a[2], np.int8),
             plane=frozen(plane, np.int8),
-            feed_mode=frozen(a[:, 21], np.int8),
-            modal_feed=frozen(a[:, 23]),
+            feed_mode=frozen(a[21], np.int8),
+            modal_feed=frozen(a[23]),
             moved=frozen((flags[:, None] >> np.array([8, 9, 10])) & 1, np.bool_),
             code_stated=frozen((flags & 16) > 0, np.bool_),
             feed_stated=frozen((flags & 32) > 0, np.bool_),
             modes_changed=frozen((flags & 64) > 0, np.bool_),
             stops=frozen((flags & 128) > 0, np.bool_),
-            waits_ahead=frozen(a[:, 25] % 2.0 == 1.0, np.bool_),
-            waits_in_line=frozen(a[:, 25] >= 2.0, np.bool_),
+            waits_ahead=frozen(a[25] % 2.0 == 1.0, np.bool_),
+            waits_in_line=frozen(a[25] >= 2.0, np.bool_),
             fixed=frozen(fixed, np.bool_),
         )
         return path, sites

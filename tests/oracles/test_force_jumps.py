@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from camcomp.compensation.long import runs
-from camcomp.compensation.long.linear_run import NotInPieces
 from camcomp.compensation.long.program import LongProgram
+from camcomp.compensation.long.runs import NotInPieces
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.verify import verify
 from camcomp.ground.files import shipped

@@ -15,13 +15,11 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from camcomp.compensation.long.answers import MOST_CHECKED, with_answers
-from camcomp.compensation.long.linear_run import LinearRun, NotInPieces
-from camcomp.compensation.long.runs import InterpretedRun, Runs
+from camcomp.compensation.long.runs import NotInPieces, Run, Runs
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.moves import minutes_of
 from camcomp.compensation.program.totals import JointTableRows, Totals
 from camcomp.gcode.output import Part, Standing
-from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.program import Program
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.stamp import is_stamped, stamp_index, stamp_text
@@ -29,7 +27,7 @@ from camcomp.gcode.text import Text
 from camcomp.gcode.uncorrected import UncorrectedFeeds
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID, Path
-from camcomp.ground.errors import CheckFailed, FileError
+from camcomp.ground.errors import CheckFailed, FileError, Location
 from camcomp.ground.progress import done
 from camcomp.ground.progress import part as part_of_work
 from camcomp.ground.records import dataclass, replace
@@ -37,7 +35,7 @@ from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.job import Job
 
 if TYPE_CHECKING:
-    from camcomp.compensation.long.followed_runs import FollowedRuns
+    from camcomp.model.stock.memory import StockMemory
 
 HASHED = 1 << 22  # bytes at once
 LINE_OF_STAMP, LINE_BYTES = 256, 24.0  # bytes; of a stamp at most, of a line of a program about
@@ -100,7 +98,9 @@ class LongProgram:
         if runs.digest.digest() != digest.digest():
             raise FileError("CC500", f"cannot read {self.name}: it changed meanwhile", hint="run the command again")
         if self._stock is not None:
-            self._stock.finish()
+            from camcomp.model.stock.follow import refuse_untouched
+
+            refuse_untouched(self.job.config, self._stock)
         read = [*runs.warnings, *self._feeds.warnings(), *runs.behind_end]
         totals.finish(runs.language, read, runs.waiting_s(self.job.config))
         target, force = np.split(np.concatenate(self._sample), [3], axis=1)
@@ -139,10 +139,17 @@ class LongProgram:
         """Leads a piece, and only then, through the stock."""
         if self._stock is None:
             return
-        ahead = None if after is None else after.path.take(np.arange(after.ends[0] + 1))
-        piece.engaged, found = self._stock.follow(piece.path, ahead)
+        from camcomp.model.stock.follow import refuse_crashes
+
+        n, paths = len(piece.path), [piece.path]
         if after is not None:
-            after.engaged = found
+            paths.append(after.path.take(np.arange(after.ends[0] + 1)))
+        both = Path.joined(paths)
+        found, crashes = self._stock.follow(both, ahead=len(both) - n)
+        refuse_crashes(piece.path, crashes, lambda line: Location(self.name, line, 1))
+        piece.engaged = found.of_motions(0, n)
+        if after is not None:
+            after.engaged = found.of_motions(n, len(both))
 
     def _stamped(self, data: bytes) -> bytes:
         if self._stamp is None or not data:
@@ -159,7 +166,7 @@ class LongProgram:
         Machines without effects are interpolated along linear moves only; other lines are few.
         """
         by_points = bool(self.job.config.uncertain or self.job.causes)
-        job = self._interpolated if by_points or isinstance(piece.run, LinearRun) else self.job
+        job = self._interpolated if by_points or piece.run.linear is not None else self.job
         first = int(before is not None)
         part = Part(first, first + len(piece.path), self._output)
         program = piece.between(before, after)
@@ -212,21 +219,34 @@ class LongProgram:
         self._told = self._beside.submit(tell)
 
 
-def _stock_of(job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRuns | None:
-    if job.config.workpiece.stock is None:
+def _stock_of(job: Job, source: BinaryIO, name: str, setup: Setup) -> StockMemory | None:
+    """The stock; the program is read here where it depends on its bounds or tools. None: there is no stock."""
+    stock = job.config.workpiece.stock
+    if stock is None:
         return None
-    from camcomp.compensation.long.followed_runs import FollowedRuns  # only those with a stock wait for it
+    from camcomp.model.stock.from_config import Bounds, memory_of  # only those with a stock wait for it
+    from camcomp.model.stock.tool_frame import tool_frame_of
 
-    return FollowedRuns.of(job, source, name, setup)
+    bounds = Bounds()
+    if stock.type == "program" or job.config.tools:
+        runs = Runs(source=source, name=name, setup=setup, dialect=job.config.control.dialect)
+        for run in runs:
+            if isinstance(run, Run) and run.linear is not None and stock.type != "program":
+                if (run.linear.kind != RAPID).any():
+                    bounds.tools.add(run.state.tool)
+            elif isinstance(run, Run) and run.motions:
+                bounds.add(runs.program(run).path)
+        source.seek(0)
+    return memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds)
 
 
 class _Piece:
     """A run with what its neighbours need to know of it. Raises NotInPieces for a run without a motion of a length."""
 
-    def __init__(self, run: LinearRun | InterpretedRun, runs: Runs) -> None:
-        self.run, self._program = run, runs.program(run)
+    def __init__(self, run: Run, runs: Runs) -> None:
+        self.run, self.program = run, runs.program(run)
         self.engaged: Engaged | None = None  # what the tool meets, or, as long as it is only looked at, at its begin
-        self.path = path = self._program.path
+        self.path = path = self.program.path
         real = np.flatnonzero((path.kind == RAPID) | (path_geometry.lengths(path) > 0.0))
         if not len(real) or len(path) != run.motions:
             raise NotInPieces
@@ -235,24 +255,19 @@ class _Piece:
 
     def between(self, before: _Piece | None, after: _Piece | None) -> Program:
         """Its program with the end of the motion in front of it and the begin of that behind it, which have no words."""
-        program, n = self._program, len(self.path)
+        program, n = self.program, len(self.path)
         paths, modes, rows = [self.path], program.modes, np.arange(n)
         if before is not None:
-            paths, modes = [before.last, *paths], (before.modes[before.ends[1]], *modes)
+            paths, modes = [before.last, *paths], (before.program.modes[before.ends[1]], *modes)
             rows = np.append(0, rows)
         if after is not None:
-            paths, modes = [*paths, after.first], (*modes, after.modes[after.ends[0]])
+            paths, modes = [*paths, after.first], (*modes, after.program.modes[after.ends[0]])
             rows = np.append(rows, n - 1)
         shift = int(before is not None)
         return replace(
             program, path=Path.joined(paths), sites=program.sites.take(rows), modes=modes,
             rebases=tuple(replace(each, motion=each.motion + shift) for each in program.rebases),
         )  # fmt: skip
-
-    @property
-    def modes(self) -> tuple[PathMode, ...]:
-        """Path mode of every motion."""
-        return self._program.modes
 
 
 def _still(engaged: Engaged, row: int, motion: int) -> Engaged:

@@ -13,12 +13,11 @@ from typing import BinaryIO
 
 import numpy as np
 
-from camcomp.compensation.long.linear_run import LinearRun, NotInPieces
 from camcomp.gcode.detect import dialect_of
 from camcomp.gcode.interpret import Interpreter, controller
 from camcomp.gcode.linear_lines import LONGEST_END, MORE, LinearMotions, scan
 from camcomp.gcode.linear_reader import follow, is_linear, motion_number
-from camcomp.gcode.program import Program, Rebase
+from camcomp.gcode.program import Program
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import END_OF_LINE, Text
@@ -47,24 +46,29 @@ class Piece(Text):
         return replace(super().place(index, column), line=self.row0 + index + 1)
 
 
-@dataclass(eq=False)
-class InterpretedRun:
-    """Lines for the interpreter, collected one after the other."""
+class NotInPieces(Exception):
+    """The program has to be read as a whole."""
 
-    row0: int
+
+@dataclass(eq=False)
+class Run:
+    """Lines of a program, collected one after the other, and the motions in them."""
+
+    row0: int  # lines of the program before it
     state: ControlState  # in front of it
     stated: list[bool]  # motion code and feed were stated between the motion in front of it and its first line
     lines: list[bytes] = field(default_factory=list)
     motions: int = 0
+    linear: LinearMotions | None = None  # the motions, if all are linear moves and read; None: for the interpreter
 
     @property
     def text(self) -> bytes:
         """Its lines."""
         return b"".join(self.lines)
 
-    def add(self, lines: bytes, motions: int) -> None:
+    def add(self, lines: list[bytes], motions: int) -> None:
         """Add lines and the number of their motions."""
-        self.lines.append(lines)
+        self.lines += lines
         self.motions += motions
 
 
@@ -98,16 +102,16 @@ class Runs:
         self._seen = False  # a line with something in it was read
         self._told: set[str] = set()
 
-    def __iter__(self) -> Iterator[LinearRun | InterpretedRun | bytes]:
+    def __iter__(self) -> Iterator[Run | bytes]:
         """Runs in order; bytes behind the program's end, as they are."""
-        held: InterpretedRun | None = None
+        held: Run | None = None
         ended = False
         while not ended:
             row, before = self._row, self._state
             found = self._linear(RUN if held is None else PROBE_MOTIONS)
             if found is not None:
                 if held is not None and found.motions < PROBE_MOTIONS:
-                    held.add(found.data[found.text_at : found.text_end].tobytes(), found.motions)
+                    held.add(found.lines, found.motions)
                     continue
                 if held is not None:
                     yield held
@@ -117,9 +121,9 @@ class Runs:
             line = self._next_line()
             if line is None:
                 break
-            held = held or InterpretedRun(row, before.copy(), list(self._flags))
+            held = held or Run(row, before.copy(), list(self._flags))
             motions, ended = self._interpret(line)
-            held.add(line, motions)
+            held.add([line], motions)
         if held is not None:
             yield held
         if not self.motions:
@@ -183,30 +187,28 @@ class Runs:
 
     # --- lines ---------------------------------------------------------------------------------------------------
 
-    def _linear(self, limit: int) -> LinearRun | None:
+    def _linear(self, limit: int) -> Run | None:
         """The linear moves from here on; None if they contain no motion."""
         state = self._state
         if not is_linear(state):
             return None
-        room, position, begin = LinearMotions.room(limit), np.array(state.position), self._at
-        n, rows, at, why, code, feed, coded, fed = scan(
-            self._data, begin, len(self._data), self._last, motion_number(state), state.feed or 0.0, *self._flags,
+        room, position, data = LinearMotions.room(limit), np.array(state.position), self._data[self._at :]
+        n, rows, end, why, code, feed, coded, fed = scan(
+            data, 0, len(data), self._last, motion_number(state), state.feed or 0.0, *self._flags,
             position, state.unit, np.array(state.offset), self.language.increments, room, limit,
         )  # fmt: skip
         if why == MORE and n < limit and self._more():
             return self._linear(limit)
         if n == 0:
             return None
+        run = Run(self._row, state.copy(), self._flags, [data[:end].tobytes()], n, room.take(0, n))
         self._flags = [bool(coded), bool(fed)]
         follow(state, code, feed, position)
-        self._at = at
-        row0, self._row = self._row, self._row + rows
+        state.waits = False
+        self._at += end
+        self._row += rows
         self.motions += n
-        waits, state.waits = state.waits, False
-        return LinearRun(
-            data=self._data, text_at=begin, text_end=at, row0=row0, linear=room.take(0, n), state=state.copy(),
-            waits=waits,
-        )  # fmt: skip
+        return run
 
     def _interpret(self, line: bytes) -> tuple[int, bool]:
         """Executes a line: its number of motions, and whether the program ends there."""
@@ -244,21 +246,20 @@ class Runs:
         if not reader.straight or reader.record.cycles:
             raise NotInPieces
 
-    def program(self, run: LinearRun | InterpretedRun) -> Program:
+    def program(self, run: Run) -> Program:
         """A run as a program of its own, from the state of the control in front of it on."""
         text = Piece(self.name, run.text.decode("latin-1"), "latin-1", b"", run.row0)
-        rebases: tuple[Rebase, ...] = ()
-        if isinstance(run, LinearRun):
-            path, sites, modes = run.path, run.sites, (run.state.path_mode,) * run.motions
-        else:
-            reader = self.reader(text, run.state.copy())
-            reader.warnings = []
-            reader.record.code_stated, reader.record.feed_stated = run.stated
+        reader = self.reader(text, run.state.copy())
+        reader.warnings = []
+        reader.record.code_stated, reader.record.feed_stated = run.stated
+        if run.linear is None:
             controller(reader).run()
             self.check(reader)
-            (path, sites), modes, rebases = reader.record.finish(), tuple(reader.record.modes), tuple(reader.rebases)
-            path = replace(path, line=path.line + run.row0)
+        else:
+            reader.record.linear_motions(0, run.linear, reader.state)
+        path, sites = reader.record.finish()
         return Program(
-            data=run.text, name=self.name, dialect=self.language.name, path=path, warnings=(), text=text, sites=sites,
-            rebases=rebases, setup=self.setup, language=self.language, feed_point=self.feed_point, modes=modes, straight=True,
+            data=run.text, name=self.name, dialect=self.language.name, path=replace(path, line=path.line + run.row0),
+            warnings=(), text=text, sites=sites, rebases=tuple(reader.rebases), setup=self.setup, language=self.language,
+            feed_point=self.feed_point, modes=tuple(reader.record.modes), straight=True,
         )  # fmt: skip
