@@ -7,9 +7,7 @@ run straight. Where values jump (several rows at one place) the rows of A and B 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -17,14 +15,14 @@ from camcomp.ground.csv_table import TableRules, read_csv
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.files import display_name, read_bytes
+from camcomp.ground.result import Result, Size
 
 Columns = Mapping[str, Floats]
 KEYS = ("line", "s_mm", "t_s")
 SAME = 2e-6  # mm or s: places that a table with six decimals cannot tell apart
 
 
-@dataclass(frozen=True, kw_only=True)
-class Difference:
+class Difference(Result):
     """A minus B of one column, or the distance of two points, over the rows that have both.
 
     line and place: where the difference is largest; a and b the values there (NaN for distances).
@@ -36,13 +34,12 @@ class Difference:
     rms: float
     mean: float
     line: int | None
-    place: float
-    a: float
-    b: float
+    place: Size
+    a: Size
+    b: Size
 
 
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
+class Comparison(Result):
     """by: s_mm, t_s or row. rows: those of A; of these, unmatched have no counterpart in B and interpolated lie between two.
 
     Between two rows of B a curved column, e.g. an actuator's along a straight line of the tip, shows the chord's error.
@@ -55,17 +52,6 @@ class Comparison:
     differences: list[Difference]
     only_a: list[str]
     only_b: list[str]
-
-    def as_json(self) -> dict[str, Any]:
-        """Figures for JSON; missing and infinite values are null."""
-        rows = [
-            {
-                key: None if isinstance(value, float) and not np.isfinite(value) else value
-                for key, value in vars(d).items()
-            }
-            for d in self.differences
-        ]
-        return {**vars(self), "differences": rows}
 
 
 def read_columns(path: str) -> Columns:

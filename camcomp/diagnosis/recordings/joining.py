@@ -6,8 +6,8 @@ stands still while poses are measured one after the other.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class SampledTable:
 
     source: SampledColumns
     time: Floats | None
-    values: Mapping[str, Floats]
+    values: dict[str, Floats]
     row: Ints
     leading: bool
 
@@ -39,21 +39,13 @@ class SampledTable:
         return len(self.row)
 
 
-@dataclass(frozen=True, eq=False)
-class Joined:
-    """One table. row (n,): of the source of the leading part."""
+def join(parts: Sequence[SampledTable], by: str | None) -> tuple[SampledTable, tuple[str, ...]]:
+    """Join parts on common rows, those of the leading part, with notes.
 
-    time: Floats | None
-    values: dict[str, Floats]
-    source: SampledColumns
-    row: Ints
-    notes: tuple[str, ...]
-
-
-def join(parts: Sequence[SampledTable], by: str | None) -> Joined:
-    """Join parts on common rows; by: "time", "rows" or None for the first possible one. Raises ConfigError CC453."""
+    by: "time", "rows" or None for the first possible one. Raises ConfigError CC453.
+    """
     if len(parts) == 1:
-        return Joined(parts[0].time, dict(parts[0].values), parts[0].source, parts[0].row, ())
+        return parts[0], ()
     files = {part.source.file for part in parts}
     alike = len({part.rows for part in parts}) == 1
     if by == "rows" or (by is None and len(files) == len(parts) and alike):
@@ -61,11 +53,11 @@ def join(parts: Sequence[SampledTable], by: str | None) -> Joined:
             _refuse(parts, f"{' and '.join(str(part.rows) for part in parts)} rows cannot be joined row by row")
         time = next((part.time for part in parts if part.time is not None), None)
         values = {name: each for part in parts for name, each in part.values.items()}
-        return Joined(time, values, parts[0].source, parts[0].row, (f"joined row by row: {_files(parts)}",))
+        return replace(parts[0], time=time, values=values), (f"joined row by row: {_files(parts)}",)
     return _on_time(parts)
 
 
-def _on_time(parts: Sequence[SampledTable]) -> Joined:
+def _on_time(parts: Sequence[SampledTable]) -> tuple[SampledTable, tuple[str, ...]]:
     times = [part.time for part in parts if part.time is not None]
     if len(times) < len(parts):
         _refuse(parts, "the parts have neither times nor equally many rows")
@@ -94,7 +86,7 @@ def _on_time(parts: Sequence[SampledTable]) -> Joined:
     note = f"joined {how}, on the rows of {parts[lead].source.file}: {_files(parts)}"
     lost = parts[lead].rows - len(row)
     notes = (note, f"{lost} rows outside the common time dropped") if lost else (note,)
-    return Joined(base[row], values, parts[lead].source, parts[lead].row[row], notes)
+    return replace(parts[lead], time=base[row], values=values, row=parts[lead].row[row]), notes
 
 
 def _step(time: Floats) -> float:

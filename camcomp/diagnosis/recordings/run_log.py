@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from camcomp.diagnosis.recordings.joining import Joined, SampledTable, join
+from camcomp.diagnosis.recordings.joining import SampledTable, join
 from camcomp.diagnosis.recordings.naming import (
     Pick,
     Picked,
@@ -59,8 +59,8 @@ def log_of(name: str, sampled: Sequence[SampledColumns], actuators: Actuators, w
     picked = pick_columns(sampled, list(actuators), columns, wishes.columns)
     check_enough(sampled, picked, columns, program=wishes.program)
     notes = [note for part in sampled for note in part.notes] + picked.notes
-    joined = join(_parts(sampled, picked, columns, notes), wishes.join)
-    notes += joined.notes
+    joined, more = join(_parts(sampled, picked, columns, notes), wishes.join)
+    notes += more
     values = _in_rad(_without_dead_encoders(joined.values, columns, notes), columns, picked, wishes.degrees, notes)
     driven = wishes.program or any(log in values for log in columns.setpoint)
     time, keep = _times(joined, driven, wishes.period_s, notes)
@@ -151,7 +151,7 @@ def _without_dead_encoders(values: dict[str, Floats], columns: LogColumns, notes
     return {name: each for name, each in values.items() if name not in dead}
 
 
-def _times(joined: Joined, driven: bool, period_s: float | None, notes: list[str]) -> tuple[Floats, Ints]:
+def _times(joined: SampledTable, driven: bool, period_s: float | None, notes: list[str]) -> tuple[Floats, Ints]:
     """Seconds since the earliest row (n,), and the rows that are kept. Raises ConfigError CC405 for decreasing times."""
     row, n = joined.row, len(joined.row)
     if joined.time is None:

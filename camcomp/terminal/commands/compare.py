@@ -1,6 +1,5 @@
 """camcomp compare."""
 
-import json
 from collections.abc import Sequence
 from math import isnan
 from typing import TYPE_CHECKING
@@ -46,7 +45,7 @@ def command(
             raise ConfigError("CC451", f"no column {name} in both tables", hint=f"there are {', '.join(known)}")
     shown = [each for each in done.differences if not columns or each.column in columns]
     if json_file:
-        write_all({json_file: (json.dumps(done.as_json(), indent=2) + "\n").encode()}, inputs=(a, b))
+        write_all({json_file: done.to_json()}, inputs=(a, b))
     if json_file != STANDARD:
         click.echo("\n".join(_text(done, shown)))
     over = [
