@@ -17,7 +17,7 @@ from camcomp.diagnosis.arm.curves import covered, seen_angles
 from camcomp.diagnosis.arm.noise_floor import far_off
 from camcomp.diagnosis.arm.poses import CURVE, LEAST_POSES, ArmBench
 from camcomp.diagnosis.model.evidence import Background, LinearModel
-from camcomp.diagnosis.model.folds import REGIONS, Excess, excess_of, folds_of, held_out
+from camcomp.diagnosis.model.folds import REGIONS, Excess, excess_of, folds_of
 from camcomp.diagnosis.model.group import Group, split_regions
 from camcomp.diagnosis.model.search import best_of, search_sets
 from camcomp.diagnosis.result.types import FoundCause, UnknownCause, UnseenShrinkage
@@ -51,7 +51,7 @@ def check_held_out(case: PoseCase, model: LinearModel) -> Excess | None:
         return None
     found = case.explanation
     background = Background(families=found.background.families)
-    return excess_of(model, held_out(model, background, found.members, pairs), case.floor.freedom)
+    return excess_of(model, background, found.members, pairs, case.floor.freedom)
 
 
 def without_far_judged(case: PoseCase) -> PoseCase:

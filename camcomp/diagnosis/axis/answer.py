@@ -104,7 +104,7 @@ def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
                     backward_N=round(line.backward, 3),
                 )
             )
-        largest = {name: share for name, share in sorted(a.unknown_in, key=lambda each: each[1])}
+        largest = dict(sorted(a.unknown_in, key=lambda each: each[1]))
         drivers += [Driver(covariate=name, share=round(share, 4)) for name, share in largest.items()]
     lag = any(c.effect in ("servo_lag", "speed_limit") for c in known)
     return Where(

@@ -22,16 +22,6 @@ ABOVE = 1.25  # of the floor's square: instruments know themselves to an eighth
 REGIONS = 16  # of positions or time, between which squares are compared
 
 
-@dataclass(frozen=True, eq=False)
-class HeldOut:
-    """Residuals of a fold: rows of the model's group g; near (n, c) in channel units; squares (n,) of values of size 1."""
-
-    group: int
-    left: Floats
-    near: Floats
-    squares: Floats
-
-
 @dataclass(frozen=True)
 class Excess:
     """Mean square of residuals in units of the noise, and its standard error."""
@@ -63,38 +53,29 @@ def folds_of(model: LinearModel) -> list[tuple[int, tuple[int, ...]]]:
     return [(g, tuple(i for i in own if i != g)) for g in own]
 
 
-def held_out(
-    model: LinearModel, background: Background, members: Members, folds: Sequence[tuple[int, tuple[int, ...]]]
-) -> list[HeldOut]:
-    """Residuals of folds with a set and its background fitted to their other groups."""
+def excess_of(
+    model: LinearModel, background: Background, members: Members, folds: Sequence[tuple[int, tuple[int, ...]]],
+    freedom: float,
+) -> Excess:  # fmt: skip
+    """Mean square against the noise of folds, with a set and its background fitted to their other groups.
+
+    Its standard error is that between regions and of the noise itself (freedom).
+    """
     slab = model.reduced(background).slab(members)
-    out = []
+    total, count = [], []
     for g, others in folds:
         group, D = model.groups[g], model.layout.design(model.groups[g])
-        before = model.posterior(background, slab, others)
-        both = model.posterior(background, slab, (*others, g))
-        left, near = group.y - D @ before.mean, group.y - D @ both.mean
+        left, near = (group.y - D @ model.posterior(background, slab, by).mean for by in (others, (*others, g)))
         alone = all(model.groups[i].label != group.label for i in others)
-        free = group.N.shape[2] if alone else 0
-        values = int(np.isfinite(group.y).sum())
-        product = np.nan_to_num(left * near / group.sd**2)
-        squares = product.sum(axis=1) * values / max(values - free, 1)
-        if alone:
-            left = without_nuisances(left, group.N)
-        out.append(HeldOut(g, left, near, squares))
-    return out
-
-
-def excess_of(model: LinearModel, parts: Sequence[HeldOut], freedom: float = np.inf) -> Excess:
-    """Mean square against the noise, with the standard error between regions and of the noise itself (freedom)."""
-    total, count = [], []
-    for part in parts:
-        group = model.groups[part.group]
-        at = group.positions("posture" if group.position is not None else "time")
-        region = split_regions(at, min(REGIONS, max(len(part.squares) // 4, 2)))
         values = np.isfinite(group.y).sum(axis=1)
+        known = int(values.sum())
+        squares = (
+            np.nan_to_num(left * near / group.sd**2).sum(axis=1) * known / max(known - alone * group.N.shape[2], 1)
+        )
+        at = group.positions("posture" if group.position is not None else "time")
+        region = split_regions(at, min(REGIONS, max(len(squares) // 4, 2)))
         for i in np.unique(region):
-            total.append(float(part.squares[region == i].sum()))
+            total.append(float(squares[region == i].sum()))
             count.append(float(values[region == i].sum()))
     s, n = np.array(total), np.array(count)
     mean = float(s.sum() / n.sum())

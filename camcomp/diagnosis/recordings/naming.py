@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from operator import eq
 
 from camcomp.diagnosis.recordings.numbered_joints import numbered_joints
 from camcomp.diagnosis.recordings.sampled import SampledColumns, some
@@ -218,11 +219,11 @@ def _usual(parts: Sequence[SampledColumns], log: str, usual: Sequence[str], take
     ]
     stated = log.startswith("act_") and unit_of(log) in _EFFORTS
     for wanted in (log.lower(), *usual):
-        for fits in (_same, _same_with_unit, _ends):
+        for fits in (eq, _same_with_unit, _ends):
             bare = wanted == log.lower() or not stated
             tried = [_pick(parts[i], i, j, log, bare) for i, j, name in free if fits(name, wanted)]
             good = [pick for pick in tried if pick is not None]
-            if len(good) > 1 and fits is _same:
+            if len(good) > 1 and fits is eq:
                 good = good[:1]  # twice in one table: an error when it is read
             if good:
                 return good
@@ -240,10 +241,6 @@ def _plain(name: str) -> str:
     """A name in lower case, its words (ActualPosition: two) joined by underscores, steps of a path by points."""
     apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", "_", name)
     return re.sub(r"(?<=\w)[\s-]+(?=\w)", "_", apart.lower().lstrip("/").replace("/", "."))
-
-
-def _same(name: str, wanted: str) -> bool:
-    return name == wanted
 
 
 def _same_with_unit(name: str, wanted: str) -> bool:

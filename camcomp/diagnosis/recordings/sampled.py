@@ -24,7 +24,6 @@ class SampledColumns:
     file: str
     names: tuple[str, ...]
     units: tuple[str, ...]
-    rows: int
     time: Floats | None
     read: Callable[[int], Floats]
     at: Callable[[int, int], Location]
@@ -38,7 +37,7 @@ def of_values(
 ) -> SampledColumns:  # fmt: skip
     """Columns of values (n,) that a container holds as numbers: their cells have no location of their own."""
     return SampledColumns(
-        file=file, names=tuple(names), units=tuple(units), rows=len(values[0]), time=time, read=values.__getitem__,
+        file=file, names=tuple(names), units=tuple(units), time=time, read=values.__getitem__,
         at=lambda row, column: Location(file, 1, 1), notes=tuple(notes),
     )  # fmt: skip
 

@@ -64,7 +64,7 @@ def of_table(
 
     names = tuple(table.header[j] for j in kept)
     return SampledColumns(
-        file=table.name, names=names, units=tuple(units[j] if units else "" for j in kept), rows=len(table.rows), time=time,
+        file=table.name, names=names, units=tuple(units[j] if units else "" for j in kept), time=time,
         read=read, at=at, notes=tuple(notes), headed=table.headed,
     )  # fmt: skip
 

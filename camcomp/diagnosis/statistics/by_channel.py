@@ -44,11 +44,6 @@ class ByChannel:
     def _starts(self) -> list[int]:
         return [int(n) for n in np.cumsum([0, *(len(X) for _, X in self.parts)])]
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows, columns."""
-        return len(self), self.width
-
     def __len__(self) -> int:
         return self._starts[-1]
 

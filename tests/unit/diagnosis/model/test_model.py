@@ -13,7 +13,7 @@ from camcomp.diagnosis.model.classes import alternatives_of
 from camcomp.diagnosis.model.discrepancy import covariate_columns, smooth_functions
 from camcomp.diagnosis.model.evidence import WIDTHS, Background, LinearModel
 from camcomp.diagnosis.model.explain import KnownNoise, explain
-from camcomp.diagnosis.model.folds import excess_of, folds_of, held_out
+from camcomp.diagnosis.model.folds import excess_of, folds_of
 from camcomp.diagnosis.model.group import Group, SmoothProcess
 from camcomp.diagnosis.model.noise import resolution_of
 from camcomp.diagnosis.model.verdict import decide
@@ -111,7 +111,7 @@ def test_more_noise_than_stated_is_unmodelled_and_without_a_floor_is_not():
 
 def test_held_out_squares_are_those_of_the_noise_and_grow_with_a_missing_cause():
     m = model(np.random.default_rng(5), (0.06,), n=200)
-    complete, lacking = (excess_of(m, held_out(m, Background(), s, folds_of(m))) for s in ((0,), ()))
+    complete, lacking = (excess_of(m, Background(), s, folds_of(m), np.inf) for s in ((0,), ()))
     assert complete.mean == pytest.approx(1.0, abs=0.25)
     assert lacking.mean > 1.3
     assert not complete.above

@@ -37,7 +37,7 @@ def test_it_multiplies_as_an_array(lean, whole):
     a, X = rng.standard_normal((K, 2)), rng.standard_normal((len(whole), 4))
     X[N : 2 * N] = 0.0
     alike = ByChannel.of(X.reshape(CHANNELS, N, 4))
-    assert lean.shape == whole.shape and len(lean) == len(whole)
+    assert (len(lean), lean.width) == whole.shape
     for got, true in (
         (lean @ a, whole @ a),
         (lean @ a[:, 0], whole @ a[:, 0]),
