@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from camcomp.compensation.long.answers import MOST_CHECKED, with_answers
-from camcomp.compensation.long.runs import NotInPieces, Run, Runs
+from camcomp.compensation.long.runs import NotInPieces, ProgramRun, Runs
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.moves import minutes_of
 from camcomp.compensation.program.totals import JointTableRows, Totals
@@ -231,10 +231,10 @@ def _stock_of(job: Job, source: BinaryIO, name: str, setup: Setup) -> StockMemor
     if stock.type == "program" or job.config.tools:
         runs = Runs(source=source, name=name, setup=setup, dialect=job.config.control.dialect)
         for run in runs:
-            if isinstance(run, Run) and run.linear is not None and stock.type != "program":
+            if isinstance(run, ProgramRun) and run.linear is not None and stock.type != "program":
                 if (run.linear.kind != RAPID).any():
                     bounds.tools.add(run.state.tool)
-            elif isinstance(run, Run) and run.motions:
+            elif isinstance(run, ProgramRun) and run.motions:
                 bounds.add(runs.program(run).path)
         source.seek(0)
     return memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds)
@@ -243,7 +243,7 @@ def _stock_of(job: Job, source: BinaryIO, name: str, setup: Setup) -> StockMemor
 class _Piece:
     """A run with what its neighbours need to know of it. Raises NotInPieces for a run without a motion of a length."""
 
-    def __init__(self, run: Run, runs: Runs) -> None:
+    def __init__(self, run: ProgramRun, runs: Runs) -> None:
         self.run, self.program = run, runs.program(run)
         self.engaged: Engaged | None = None  # what the tool meets, or, as long as it is only looked at, at its begin
         self.path = path = self.program.path

@@ -50,8 +50,8 @@ class NotInPieces(Exception):
     """The program has to be read as a whole."""
 
 
-@dataclass(eq=False)
-class Run:
+@dataclass(eq=False, kw_only=True)
+class ProgramRun:
     """Lines of a program, collected one after the other, and the motions in them."""
 
     row0: int  # lines of the program before it
@@ -102,9 +102,9 @@ class Runs:
         self._seen = False  # a line with something in it was read
         self._told: set[str] = set()
 
-    def __iter__(self) -> Iterator[Run | bytes]:
+    def __iter__(self) -> Iterator[ProgramRun | bytes]:
         """Runs in order; bytes behind the program's end, as they are."""
-        held: Run | None = None
+        held: ProgramRun | None = None
         ended = False
         while not ended:
             row, before = self._row, self._state
@@ -121,7 +121,7 @@ class Runs:
             line = self._next_line()
             if line is None:
                 break
-            held = held or Run(row, before.copy(), list(self._flags))
+            held = held or ProgramRun(row0=row, state=before.copy(), stated=list(self._flags))
             motions, ended = self._interpret(line)
             held.add([line], motions)
         if held is not None:
@@ -187,7 +187,7 @@ class Runs:
 
     # --- lines ---------------------------------------------------------------------------------------------------
 
-    def _linear(self, limit: int) -> Run | None:
+    def _linear(self, limit: int) -> ProgramRun | None:
         """The linear moves from here on; None if they contain no motion."""
         state = self._state
         if not is_linear(state):
@@ -201,7 +201,10 @@ class Runs:
             return self._linear(limit)
         if n == 0:
             return None
-        run = Run(self._row, state.copy(), self._flags, [data[:end].tobytes()], n, room.take(0, n))
+        run = ProgramRun(
+            row0=self._row, state=state.copy(), stated=self._flags, lines=[data[:end].tobytes()], motions=n,
+            linear=room.take(0, n),
+        )  # fmt: skip
         self._flags = [bool(coded), bool(fed)]
         follow(state, code, feed, position)
         state.waits = False
@@ -246,7 +249,7 @@ class Runs:
         if not reader.straight or reader.record.cycles:
             raise NotInPieces
 
-    def program(self, run: Run) -> Program:
+    def program(self, run: ProgramRun) -> Program:
         """A run as a program of its own, from the state of the control in front of it on."""
         text = Piece(self.name, run.text.decode("latin-1"), "latin-1", b"", run.row0)
         reader = self.reader(text, run.state.copy())

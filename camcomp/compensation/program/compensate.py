@@ -354,7 +354,7 @@ class _Correction:
         after = see(job, points, told, self.orienting, written.words)
         missed = after.error
         if self.shares is not None:
-            missed = missed - self.shares.left(job, track, points.piece, points.w, points.travel, points.before)
+            missed = missed - self.shares.left(job, track, points.piece, points.w, points.travel, before=points.before)
         size = np.where(after.status == 0, sizes(missed), np.inf)
         if after.tilt is not None:
             size = np.maximum(size, np.nan_to_num(after.tilt) * self.goal[points.piece] / MOST_TILT_RAD)
