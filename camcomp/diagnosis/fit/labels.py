@@ -5,18 +5,23 @@ nothing to differ from: then labels scatter about what they have in common, by a
 by is found before anything is asked about causes.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import ndtr, stdtrit
 
-from camcomp.diagnosis.fit.bench import Run
 from camcomp.diagnosis.statistics.noise_model import weighted_median
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
-from camcomp.model.motion.twin import Twin
+
+if TYPE_CHECKING:
+    from camcomp.diagnosis.fit.bench import Run
+    from camcomp.model.motion.twin import Twin
 
 PASSES = 5
 STEP_S = 1e-4  # in which a tip moves in one direction

@@ -37,7 +37,8 @@ def run(temperature):
 
 def test_a_run_without_temperatures_says_nothing_of_them():
     runs, nominal = zip(run(np.linspace(20.0, 25.0, ROWS)), run(None), strict=True)
-    tip = dictionary(SimpleNamespace(runs=runs, nominal=nominal, actuators=("x",)))
+    parts = {"tip": slice(0, 3), "encoder": slice(3, 4), "drive": slice(4, 5), "dyno": slice(5, 8)}
+    tip = dictionary(SimpleNamespace(runs=runs, nominal=nominal, actuators=("x",), parts=parts))
     warm = [n for n, label in enumerate(tip.labels) if label.startswith("temperature")]
     assert warm
     assert np.abs(tip.blocks[0][:, warm]).max() > 0.0
