@@ -198,10 +198,6 @@ class ArmBench:
             hung = replace(hung, point=hung.point + grown_way(robot, q, grown))
         return LoadedArm(hung, tuple(causes), load, motion)
 
-    def tips(self, k: int, causes: Sequence[Cause], at: Registration) -> Floats:
-        """Tips (n, 3) of campaign k in the machine frame, without its nuisances."""
-        return self.standing(self.campaigns[k], causes).tips(at)
-
     def columns(self, without: Sequence[str] = ()) -> list[Column]:
         """Every parameter of the shelf that may move a standing arm, once for each shape of effects of drives and links."""
         timed = self._warm or all(
@@ -252,8 +248,7 @@ class ArmBench:
         causes = combined(columns, amounts)
         out = []
         for k, campaign in enumerate(self.campaigns):
-            frame, owner = self.registration(k, causes), self.owner[k]
-            stood = self.standing(campaign, causes)
+            owner, (frame, stood) = self.owner[k], self.registered(k, causes)
             here = stood.tips(frame)
             X = self._motion(campaign, columns, amounts, frame, here)
             left = frame.to_machine(campaign.tip) - here
@@ -306,10 +301,10 @@ class ArmBench:
         moved = [self.standing(replace(poses, q=poses.q + each), causes).tips(at) - here for each in step]
         return np.stack(moved, axis=2) / _JOINT_STEP
 
-    def registration(self, k: int, causes: Sequence[Cause]) -> Registration:
-        """Frame and tool vector of campaign k, or of the fitted one that it shares them with, that fit best with causes."""
-        k = self.owner[k]
-        campaign, at = self.campaigns[k], self.start[k]
+    def registered(self, k: int, causes: Sequence[Cause]) -> tuple[Registration, LoadedArm]:
+        """Campaign k with causes, and the frame and tool vector that fit best to it, or to the fitted one that it shares them with."""
+        owner = self.owner[k]
+        campaign, at = self.campaigns[owner], self.start[owner]
         stood = self.standing(campaign, causes)
         for _ in range(3):
             here = stood.tips(at)
@@ -317,12 +312,12 @@ class ArmBench:
             N = nuisance_columns(here, stood.hung.rotation, about)
             gap = (at.to_machine(campaign.tip) - here).ravel()
             at = at.moved(np.asarray(np.linalg.lstsq(N.reshape(-1, 9), gap, rcond=1e-8)[0], float), about)
-        return at
+        return at, stood if owner == k else self.standing(self.campaigns[k], causes)
 
     def gap(self, k: int, causes: Sequence[Cause]) -> Floats:
-        """Measured minus modelled tips (n, 3) of campaign k, machine frame, with its `registration`."""
-        at = self.registration(k, causes)
-        return at.to_machine(self.campaigns[k].tip) - self.tips(k, causes, at)
+        """Measured minus modelled tips (n, 3) of campaign k, machine frame, in the frame that fits best."""
+        at, stood = self.registered(k, causes)
+        return at.to_machine(self.campaigns[k].tip) - stood.tips(at)
 
 
 def combined(columns: Sequence[Column], amounts: Mapping[int, float]) -> list[Cause]:

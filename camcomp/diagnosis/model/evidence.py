@@ -203,7 +203,7 @@ class LinearModel:
             at = self.posterior(background)
             k = self.layout.effects
             effects = np.flatnonzero(self.size > 0.0)
-            own, by = at.without(effects)
+            own, by = at.blocks_without([effects])[0]
             gram, moment = np.zeros((k, k)), np.zeros(k)
             gram[np.ix_(effects, effects)], moment[effects] = own, by
             self._reduced[background] = Reduced(self, gram, moment, at.log_evidence)
@@ -246,10 +246,6 @@ class AmplitudePosterior:
         right[at, np.arange(len(at))] = 1.0
         own = cho_solve(self.factor, right)[at]
         return np.asarray(self.scale[at][:, None] * own * self.scale[at], float)
-
-    def without(self, columns: Ints) -> tuple[Floats, Floats]:
-        """Normal equations (d, d), (d,) of further columns with all live ones integrated out."""
-        return self.blocks_without([columns])[0]
 
     def blocks_without(self, blocks: Sequence[Ints]) -> list[tuple[Floats, Floats]]:
         """Normal equations of several groups of further columns, each alone, with all live ones integrated out."""
