@@ -316,7 +316,7 @@ def bench():
 
 def standing(causes):
     out, at = bench()
-    return out.tips(0, causes, at)
+    return out.standing(out.campaigns[0], causes).tips(at)
 
 
 def test_poses_of_an_arm_ask_the_hooks_that_a_tracker_can_see():
