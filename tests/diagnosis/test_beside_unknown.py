@@ -36,7 +36,6 @@ def test_a_soft_drive_stands_though_another_that_hardens_does_a_part_of_it(tmp_p
     assert beside(tmp_path, 2091011, "puu", known, ("hardening", "x")) == {known}
 
 
-@pytest.mark.campaign
 def test_a_loop_that_rings_twice_as_much_as_what_is_left_of_its_drive_is_not_sure(tmp_path):
     """Either something else rings there by chance, or the loop is its imitation."""
     plan = Plan(1833009, "unknown", (("servo_resonance", "x"),), (10.0,), machine="router", **LONG)

@@ -13,14 +13,16 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
 from camcomp.diagnosis.model.noise import LEAST_VALUES, REPEATABILITY_MM, resolution_of, rounding_noise
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.seams import missing_rows
 
 CLIPPED = 6.0  # robust deviations beyond which a difference of rows is no noise
 LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
 RIGID_MM_PER_N = 1e-4  # spring of a drive for which none is stated
+BEND = np.array([1.0, -2.0, 1.0]) / np.sqrt(6.0)  # a second difference whose deviation is that of the noise
 STRETCH = 16  # differences of rows that make a stretch
 LOWER_QUARTILE = 0.82  # of the scatter of such stretches of white noise, in units of the noise (4000 draws: 0.816)
+OUTLIER = len(BEND)  # second differences that hold a single row
 UNSTEADY = 1.5  # times the quiet stretches: of 4000 draws of 160 rows of white noise none had it
 
 
@@ -88,17 +90,46 @@ def steady_scatter(values: Floats, time: Floats) -> float:
     return quiet if quiet < whole / UNSTEADY else whole
 
 
+def swings(values: Floats, time: Floats, doubt: Floats, resolution: float) -> tuple[float, float]:
+    """Mean square of what swings in some stretches, faster than the rows, and the noise that it exceeds, squared as well.
+
+    Quiet stretches and the rounding tell the noise; single rows far off are outliers and do not count.
+
+    Args:
+        values: (n,) of an instrument.
+        time: (n,) s.
+        doubt: (n,) standard deviation of each row beyond the noise.
+        resolution: standard deviation of the rounding.
+    """
+    rows = _triples(values, time)
+    whole = len(rows) // STRETCH * STRETCH
+    if whole < 4 * STRETCH:
+        return 0.0, 0.0
+    energy, allowed = (
+        each[:whole].reshape(-1, STRETCH) for each in ((values[rows] @ BEND) ** 2, doubt[rows] ** 2 @ BEND**2)
+    )
+    usual = np.argsort(energy, axis=1)[:, :-OUTLIER]  # an outlier is in three triples
+    energy, allowed = (np.take_along_axis(each, usual, axis=1).sum(axis=1) / STRETCH for each in (energy, allowed))
+    noise = max(float(np.quantile(energy, 0.25)), resolution**2)
+    return max(float(np.mean(energy - allowed)) - UNSTEADY**2 * noise, 0.0), noise
+
+
 def _bends(values: Floats, time: Floats) -> Floats | None:
     """Second differences in units of the noise, those far off cut; None where rows are too few."""
-    known = np.flatnonzero(np.isfinite(values))
-    if len(known) < LEAST_VALUES:
-        return None
-    x, near = values[known], ~missing_rows(time[known])
-    bend = (x[2:] - 2.0 * x[1:-1] + x[:-2])[near[1:] & near[:-1]] / np.sqrt(6.0)
+    bend = values[_triples(values, time)] @ BEND
     if not len(bend):
         return None
     middle = 1.4826 * float(np.median(np.abs(bend)))
     return np.asarray(bend if middle == 0.0 else np.clip(bend, -CLIPPED * middle, CLIPPED * middle))
+
+
+def _triples(values: Floats, time: Floats) -> Ints:
+    """Rows (m, 3) that follow each other without a gap, of those that have a value; none where these are too few."""
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) < LEAST_VALUES:
+        return np.empty((0, 3), int)
+    near = ~missing_rows(time[known])
+    return np.stack([known[:-2], known[1:-1], known[2:]], axis=1)[near[1:] & near[:-1]]
 
 
 def least_noise(bench: Bench, floor: NoiseFloor) -> Floats:
@@ -108,5 +139,10 @@ def least_noise(bench: Bench, floor: NoiseFloor) -> Floats:
     """
     size = bench.tip_sizes.max(axis=0)
     least = LEAST_SHARE * floor.axis_mm / np.where(size > 0.0, size, RIGID_MM_PER_N)
+    return np.asarray(np.hypot(least, roundings(bench)))
+
+
+def roundings(bench: Bench) -> Floats:
+    """Standard deviation (c,) of every channel's rounding."""
     steps = np.max([[resolution_of(x) for x in bench.observed(k).T] for k in range(len(bench.runs))], axis=0)
-    return np.asarray(np.hypot(least, [rounding_noise(each) for each in steps]))
+    return np.array([rounding_noise(each) for each in steps])

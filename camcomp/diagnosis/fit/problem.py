@@ -8,8 +8,9 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, cause_of, step_of
 from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
-from camcomp.diagnosis.fit.floor import NoiseFloor
+from camcomp.diagnosis.fit.floor import NoiseFloor, roundings
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
+from camcomp.diagnosis.fit.noise import inflation
 from camcomp.diagnosis.fit.patterns import KINDS, Dictionary
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.model.discrepancy import ROWS_OF_PROCESS
@@ -51,6 +52,16 @@ class Problem:
     candidates: CausePrior
     _followed: set[int] = field(default_factory=set, init=False, repr=False)
     _last: tuple[tuple[object, ...], list[Reading]] | None = field(default=None, init=False, repr=False)
+
+    @cached_property
+    def doubt(self) -> list[Floats]:
+        """Standard deviation (n, c) of every row of every run beyond the noise of its channel."""
+        return inflation(self.bench)
+
+    @cached_property
+    def rounding(self) -> Floats:
+        """Standard deviation (c,) of every channel's rounding."""
+        return roundings(self.bench)
 
     @cached_property
     def tip_gram(self) -> Floats:

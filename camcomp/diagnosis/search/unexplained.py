@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import log_ndtr, ndtri
 
 from camcomp.diagnosis.fit.bench import thinned
-from camcomp.diagnosis.fit.floor import row_scatter
+from camcomp.diagnosis.fit.floor import row_scatter, swings
 from camcomp.diagnosis.fit.outliers import TINY
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
@@ -55,8 +55,23 @@ def unexplained(problem: Problem, f: Fitted) -> dict[str, Unexplained]:
             for way, r in zip(ways, left, strict=True)
         ]
         if any(np.isfinite(a).any() for a in at_tip):
-            out[kind] = unexplained_of(problem, kind, at_tip)
+            swinging = _swinging(problem, on, left) if kind in ("tip", "encoder") else (0.0, 0.0)
+            out[kind] = unexplained_of(problem, kind, at_tip, swinging)
     return out
+
+
+def _swinging(problem: Problem, on: slice, left: Sequence[Floats]) -> tuple[float, float]:
+    """Mean square at the tip, mm2, of what swings too fast for blocks of rows in channels (n, c) of every run, and its chance.
+
+    An instrument is steady: what shakes it at times only is motion.
+    """
+    bench, found = problem.bench, []
+    for k, values in enumerate(left):
+        size = np.ones(3) if on.start == 0 else bench.tip_sizes[k, on]
+        each = zip(values[:, on].T, problem.doubt[k][:, on].T, problem.rounding[on], strict=True)
+        found.append((size**2) @ [swings(x, problem.times[k], doubt, step) for x, doubt, step in each])
+    square, noise = np.average(found, axis=0, weights=[len(values) for values in left])
+    return float(square), float(noise * np.sqrt(2.0 / sum(map(len, left))))
 
 
 def _left(problem: Problem, f: Fitted, k: int) -> Floats:
@@ -88,8 +103,12 @@ def undetermined(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
     return np.repeat(each, widths).astype(bool)
 
 
-def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:
-    """Excess residual of one kind of channel, from residuals (n, 3) of every run, mm at the tip."""
+def unexplained_of(
+    problem: Problem, kind: str, at_tip: Sequence[Floats], swinging: tuple[float, float] = (0.0, 0.0)
+) -> Unexplained:
+    """Excess residual of one kind of channel, from residuals (n, 3) of every run, mm at the tip, and the mean square of what
+    swings faster with the deviation of its chance, mm2.
+    """
     slow = problem.floor.slow_mm if kind == "tip" else 0.0
     excess: list[Floats] = []
     chance: list[Floats] = []
@@ -118,8 +137,8 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
         weight.append(np.where(enough, (usual + TINY) ** 2 / (allowed + TINY) ** 2, 0.0))
     e, v, w = (np.concatenate(each) for each in (excess, chance, weight))
     whole = np.maximum(w.sum(axis=0), 1.0)
-    mean = float((np.sum(w * e, axis=0) / whole).sum())
-    doubt = float(np.sqrt(2.0 * np.sum(np.sum((w * v) ** 2, axis=0) / whole**2))) + TINY
+    mean = float((np.sum(w * e, axis=0) / whole).sum()) + swinging[0]
+    doubt = float(np.sqrt(2.0 * np.sum(np.sum((w * v) ** 2, axis=0) / whole**2) + swinging[1] ** 2)) + TINY
     return Unexplained(kind, 1e3 * float(np.sqrt(max(mean, 0.0))), mean / doubt)
 
 
