@@ -1,7 +1,7 @@
 """Long programs for measuring: a pocketed groove of short straight moves."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 HEADER = (
     "%",
@@ -45,7 +45,17 @@ def groove(moves: int) -> Iterator[str]:
     yield "%"
 
 
-def write(path: str, moves: int) -> None:
-    """Writes the program to a file."""
+def stitches(moves: int) -> Iterator[str]:
+    """Lines of a program of cuts of 1 mm along a circle, with a rapid between any two."""
+    yield from HEADER
+    for k in range(moves // 2):
+        a = 0.01 * k
+        yield f"G0 X{20.0 * math.cos(a):.4f} Y{20.0 * math.sin(a):.4f}"
+        yield f"G1 X{20.0 * math.cos(a + 0.05):.4f} Y{21.0 * math.sin(a + 0.05):.4f}"
+    yield from ("G0 Z5", "M5 M9", "M30", "%")
+
+
+def write(path: str, moves: int, lines: Callable[[int], Iterator[str]] = groove) -> None:
+    """Writes a program to a file."""
     with open(path, "w", encoding="ascii") as file:
-        file.writelines(f"{line}\n" for line in groove(moves))
+        file.writelines(f"{line}\n" for line in lines(moves))

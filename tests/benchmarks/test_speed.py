@@ -20,12 +20,12 @@ from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.job import Job
 from camcomp.model.statics.solve import TARGET, solve
-from tests.benchmarks.programs import write
+from tests.benchmarks.programs import groove, stitches, write
 from tests.benchmarks.spent import spent
 
 pytestmark = pytest.mark.benchmarks
 
-MILLION, SHARE = 1_000_000, 100_000
+MILLION, SHARE, RAPIDS = 1_000_000, 100_000, 12_000
 MOST_FOR_BANDS = {"full": 2.5, "shrink": 3.0, "skip": 3.0}
 MACHINE = ["--config", str(shipped("config/orthoglide-1deg.yaml"))]
 NOTHING = ["--config", str(shipped("config/orthoglide.yaml")), "--config", str(shipped("config/no-force.yaml"))]
@@ -129,6 +129,19 @@ def test_everyday_programs(tmp_path, moves, wanted):
         compensate(*words, "--config", effects)  # which compiles what only effects need
         both = np.min([compensate(*words, "--config", effects) for _ in range(3)], axis=0)
         tell("  with two effects, times the time without (wanted: 2 at most)", f"{both[1] / own[1]:.1f}")
+
+
+def test_rapids_between_cuts(tmp_path):
+    """With play, which drives carry through the rapids, too: by processor time, against cuts alone."""
+    (tmp_path / "play.yaml").write_text("effects: [{effect: backlash, target: x, width_mm: 0.02}]\n")
+    words = [*MACHINE, "--config", tmp_path / "play.yaml", "-o", tmp_path / "out.nc"]
+    times = []
+    for lines in (groove, stitches):
+        write(tmp_path / "p.nc", RAPIDS, lines)
+        compensate(tmp_path / "p.nc", *words)
+        times.append(min(compensate(tmp_path / "p.nc", *words)[1] for _ in range(3)))
+    tell(f"{RAPIDS} lines with play, every other one a rapid", f"{times[1]:.2f} s of processor time")
+    tell("  times the time of cuts alone (wanted: 5 at most)", f"{times[1] / times[0]:.1f}")
 
 
 def parquet():

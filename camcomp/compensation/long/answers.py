@@ -13,7 +13,7 @@ from camcomp.compensation.program.compensate import Compensated, compensate
 from camcomp.compensation.program.result import BOUND_UM, Interpolation
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Bools, Floats, Ints
-from camcomp.ground.records import dataclass, fields, replace
+from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import largest
 from camcomp.model.job import Job
 from camcomp.model.statics.machine import Machine
@@ -144,13 +144,7 @@ class InterpolatedMachine:
             return state
         self._exact += len(rows)
         own = solve(self.machine, mode, near[rows], force=force[rows], rho=None if rho is None else rho[rows])
-        changed = {}
-        for each in fields(State):
-            value = getattr(state, each.name)
-            if len(value) == len(near):
-                changed[each.name] = value = np.array(value)
-                value[rows] = getattr(own, each.name)
-        return replace(state, **changed)
+        return state.with_rows(rows, own)
 
     def proof(self, target: Floats, force: Floats) -> tuple[Interpolation | None, int]:
         """Differences of a sample of targets (n, 3) under forces (n, 3) to their exact solutions, and the most iterations.

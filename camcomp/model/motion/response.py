@@ -7,6 +7,7 @@ exact solution of the structure. Effects of sensors change no part and do not ac
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
 
@@ -24,10 +25,11 @@ from camcomp.model.statics.lengths import LENGTH_STEP_MM, lengthened
 from camcomp.model.statics.machine import Machine, build_machine
 from camcomp.model.statics.masses import MassLoads, has_moved_mass, mass_loads, mass_loads_around
 from camcomp.model.statics.rotation import exp_rotation
-from camcomp.model.statics.solve import FREE, State, inverse, solve
+from camcomp.model.statics.solve import FREE, State, inverse, solve, with_rows
 from camcomp.model.statics.target import Correction, correct, settle
 
 SETTLED_MM = 2e-5  # residual at which the correction of effects ends
+STILL_MM = 1e-10  # residual at which a point is left alone while others go on
 MAX_AIM_STEPS = 50  # reversing friction in a soft drive reduces the residual by only a tenth per step
 FARTHER = 2.0  # times the squared residual before: growth beyond which steps are halved
 REST_S = 60.0
@@ -73,16 +75,40 @@ class Travel:
         return self.time + REST_S * np.cumsum(self.stop)
 
 
+class LatestSolutions:
+    """Solutions of the same points in one step after the other: only points whose inputs changed are solved again."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, tuple[dict[str, Floats | None], Any]] = {}
+
+    def of(self, name: str, solved: Callable[..., Any], **inputs: Floats | None) -> Any:
+        """solved(**inputs), an array or a State of n points; name: of what is asked."""
+        if name in self._known:
+            before, known = self._known[name]
+            pairs = [(each, before[key]) for key, each in inputs.items() if each is not None]
+            changed = np.logical_or.reduce([(a != b).reshape(len(a), -1).any(axis=1) for a, b in pairs])
+            rows = np.flatnonzero(changed)
+            if not len(rows):
+                return known
+            if len(rows) < len(changed):
+                own = solved(**{key: None if each is None else each[rows] for key, each in inputs.items()})
+                known = known.with_rows(rows, own) if isinstance(known, State) else with_rows(known, rows, own)
+                self._known[name] = inputs, known
+                return known
+        self._known[name] = inputs, solved(**inputs)
+        return self._known[name][1]
+
+
 def respond(
     job: Job, commanded: Floats, travel: Travel, nominal_of: Floats | None = None, *, before: Floats | None = None,
-    rho: Floats | None = None, tips_only: bool = False,
+    rho: Floats | None = None, tips_only: bool = False, latest: LatestSolutions | None = None,
 ) -> tuple[Floats, Correction]:  # fmt: skip
     """Loaded tips (n, 3) of commanded tips (n, 3), both in the program frame, and the states of the machine.
 
     nominal_of (n, 3): tips whose inverse kinematics go into rho_nominal of the states; the commanded ones by default.
     before (3,): commanded tip before the first one; the memory of drives depends on it.
     rho (n, m): set-points of the actuators; those that the control computes from the commanded tips by default.
-    tips_only: drive and tilt of the states are not used.
+    tips_only: drive and tilt of the states are not used. latest: solutions of a step before, at nearly the same points.
     """
     if before is not None and job.causes and len(commanded):
         rows = np.concatenate(([0], np.arange(len(commanded))))
@@ -91,8 +117,9 @@ def respond(
             begin = inverse(job.real_machine, job.frame.to_machine(before[None]))
             rho = np.concatenate((begin, rho))
         tip, found = respond(
-            job, np.concatenate((before[None], commanded)), travel.take(rows), other, rho=rho, tips_only=tips_only
-        )
+            job, np.concatenate((before[None], commanded)), travel.take(rows), other, rho=rho, tips_only=tips_only,
+            latest=latest,
+        )  # fmt: skip
         return tip[1:], Correction(**{each.name: getattr(found, each.name)[1:] for each in fields(found)})
     told = job.frame.to_machine(commanded)
     aim = None if nominal_of is None else job.frame.to_machine(nominal_of)
@@ -101,22 +128,24 @@ def respond(
             job.real_machine, told, travel.force, None, aim, rotation=travel.rotation, tips_only=tips_only
         )
         return _finite(job, job.frame.to_program(loaded), settled)
-    nominal = _set_points(job, told, travel)
+    latest = latest or LatestSolutions()
+    set_points = partial(_set_points, job)
+    nominal = latest.of("set-points", set_points, told=told, force=travel.force, rotation=travel.rotation)
     setpoint = nominal if rho is None else rho
     motion = _motion(job, setpoint, travel)
     loading = cache(partial(signal_path.loaded, job.causes, motion, travel.force))
     if aim is not None:
-        nominal = _set_points(job, aim, travel)
+        nominal = latest.of("nominal", set_points, told=aim, force=travel.force, rotation=travel.rotation)
     masses = cache(partial(_mass_loads, job, nominal, travel)) if has_moved_mass(job.real_machine.robot) else None
-    held = cache(partial(_held, job, told, motion, travel))
+    held = cache(partial(_held, job, told, motion, travel, latest=latest))
     motion = replace(motion, names=job.real_machine.actuators, held=held, told=lambda: commanded, masses=masses)
     error, guided = signal_path.driven(job.causes, job.real_machine.actuators, motion)
     effort = signal_path.drive_forces(job.causes, job.real_machine.actuators, guided)
     load = loading()
     carriage = motion.encoder + error
-    state = solve(
-        job.real_machine, FREE, told, aim_rotation=travel.rotation, force=load.force, wrench=load.wrench, rho=carriage,
-        tips_only=tips_only,
+    state = latest.of(
+        "tips", partial(solve, job.real_machine, FREE, tips_only=tips_only), near=told, aim_rotation=travel.rotation,
+        force=load.force, wrench=load.wrench, rho=carriage,
     )  # fmt: skip
     drive = state.drive if effort is None else state.drive + effort
     grown = signal_path.grown(job.causes, job.real_machine.actuators, motion)
@@ -128,18 +157,21 @@ def respond(
     return _finite(job, tip, Correction.of(state, state.passes))
 
 
-def _set_points(job: Job, told: Floats, travel: Travel) -> Floats:
+def _set_points(job: Job, told: Floats, force: Floats, rotation: Floats | None) -> Floats:
     """Set-points (n, m) of commanded tips (n, 3), machine frame."""
     answers = job.real_machine.answers
-    if answers is not None and travel.rotation is None:
-        return answers.set_points(told, travel.force)  # type: ignore[no-any-return]
-    return inverse(job.real_machine, told, travel.rotation)
+    if answers is not None and rotation is None:
+        return answers.set_points(told, force)  # type: ignore[no-any-return]
+    return inverse(job.real_machine, told, rotation)
 
 
-def _held(job: Job, told: Floats, motion: Motion, travel: Travel) -> Floats:
+def _held(job: Job, told: Floats, motion: Motion, travel: Travel, latest: LatestSolutions | None = None) -> Floats:
     """Drive forces (n, m) under load for carriages at their encoders, near the tips `told` (n, 3), machine frame."""
     load = signal_path.loaded(job.causes, motion, travel.force)
-    where = _turned(job.real_machine, told, travel.rotation, force=load.force, wrench=load.wrench, rho=motion.encoder)
+    where: State = (latest or LatestSolutions()).of(
+        "held", partial(solve, job.real_machine, FREE, check=False), near=told, aim_rotation=travel.rotation,
+        force=load.force, wrench=load.wrench, rho=motion.encoder,
+    )  # fmt: skip
     return np.nan_to_num(where.drive)
 
 
@@ -205,8 +237,9 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str, *, tips_only: 
         share, least, near, job = 1.0, np.inf, commanded, job.correctable
         rings = bool(signal_path.acting(job.causes, "control"))
         near_target = target if has_moved_mass(job.real_machine.robot) else None  # masses move with the target
+        latest = LatestSolutions()  # a drive that stands in its play takes all steps, and most points only a few
         for _ in range(MAX_AIM_STEPS):
-            tip, state = respond(job, commanded, travel, near_target, tips_only=True)
+            tip, state = respond(job, commanded, travel, near_target, tips_only=True, latest=latest)
             left = target - tip
             size = float(np.nansum(left**2))
             if rings and size > FARTHER * least:  # an oscillating loop overshoots
@@ -214,7 +247,9 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str, *, tips_only: 
                 continue
             if size < least:
                 least, near = size, commanded
-            commanded = commanded + share * np.where(np.isfinite(left), left, 0.0)
+            # in an oscillating loop no point is left alone, since each moves those after it
+            moved = np.isfinite(left) & (rings | (largest(left) > STILL_MM))[:, None]
+            commanded = commanded + share * np.where(moved, left, 0.0)
             found = replace(found, status=np.where(found.status == 0, state.status, found.status))
             if not np.abs(left).max(initial=0.0) > SETTLED_MM:
                 break
@@ -294,7 +329,7 @@ def without_drives(
     load = Load(travel.force, np.zeros((len(target), 6)))
     if job.causes:
         told = job.frame.to_machine(target)
-        nominal = _set_points(job, told, travel)
+        nominal = _set_points(job, told, travel.force, travel.rotation)
         load = signal_path.loaded(job.causes, _motion(job, nominal, travel), travel.force)
     aim = job.frame.to_machine(target)
     return correct(
@@ -307,12 +342,12 @@ def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
 
     Eq. (5) alone would pass the play in steps of the residual.
     """
-    solved = found.status == 0
-    lag = _lost_motion(job, found.rho[solved], found.drive[solved], travel.take(np.flatnonzero(solved)))
-    out = np.zeros((len(solved), 3))
+    solved = np.flatnonzero(found.status == 0)
+    travel = travel.take(solved)
+    lag = _lost_motion(job, found.rho[solved], found.drive[solved], travel)
+    out = np.zeros((len(found.status), 3))
     if lag.any():
-        rotation = None if travel.rotation is None else travel.rotation[solved]
-        out[solved] = _tip_way(job, found.commanded[solved], -lag, rotation)
+        out[solved] = _tip_way(job, found.commanded[solved], -lag, travel)
     return out
 
 
@@ -343,16 +378,15 @@ def behind_encoders(job: Job, commanded: Floats, travel: Travel) -> tuple[Floats
     return motion.encoder, _by_memory(job, motion)
 
 
-def _tip_way(job: Job, tip: Floats, by: Floats, rotation: Floats | None = None) -> Floats:
+def _tip_way(job: Job, tip: Floats, by: Floats, travel: Travel) -> Floats:
     """Displacement (n, 3) mm of the tip, program frame, that moves the actuators by `by` (n, m), to first order.
 
     With more actuators than X, Y, Z can move independently, the others move along.
     """
     h = 1e-3
-    rates = [
-        (inverse(job.real_machine, tip + h * axis, rotation) - inverse(job.real_machine, tip - h * axis, rotation)) / (2.0 * h)
-        for axis in np.eye(3)
-    ]  # fmt: skip
+    sides = (tip + h * axis for axis in np.eye(3)), (tip - h * axis for axis in np.eye(3))
+    ahead, behind = ([_set_points(job, each, travel.force, travel.rotation) for each in side] for side in sides)
+    rates = [(a - b) / (2.0 * h) for a, b in zip(ahead, behind, strict=True)]
     slopes = np.stack(rates, axis=2)
     if by.shape[1] > WORDS:
         slopes = np.where((by != 0.0)[:, :, None], slopes, GOES_ALONG * slopes)

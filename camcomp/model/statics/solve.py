@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from camcomp.ground.progress import points
-from camcomp.ground.records import dataclass
+from camcomp.ground.records import dataclass, fields, replace
 from camcomp.model.statics import point, rigid, sweep
 from camcomp.model.statics.layout import SPRINGS, new_memory, new_work
 from camcomp.model.statics.machine import Machine
@@ -57,6 +58,22 @@ class State:
     F: Array
     commanded_rotation: Array
     wrench: Array
+
+    def with_rows(self, rows: NDArray[np.int64], own: State) -> State:
+        """The same states with others at some rows."""
+        changed: dict[str, Any] = {}
+        for each in fields(State):
+            value = getattr(self, each.name)
+            if len(value) == len(self.status):
+                changed[each.name] = with_rows(value, rows, getattr(own, each.name))
+        return replace(self, **changed)
+
+
+def with_rows(values: Array, rows: NDArray[np.int64], own: Array) -> Array:
+    """A copy of values (n, ...) with others at some rows."""
+    out = np.array(values)
+    out[rows] = own
+    return out
 
 
 def _per_point(value: Array | None, n: int, shape: tuple[int, ...]) -> Array:
