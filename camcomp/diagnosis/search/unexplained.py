@@ -49,15 +49,22 @@ def unexplained(problem: Problem, f: Fitted) -> dict[str, Unexplained]:
     for kind in KINDS:
         on = problem.channels_of(kind)
         ways = [thinned(problem.bench.at_tip(k)[:, :, on], run.thin) for k, run in enumerate(problem.bench.runs)]
-        at_tip = [
-            # across the path alone where the motion along it is unknown
-            r[:, on] if kind == "tip" else np.einsum("nij,nj->ni", way, r[:, on])
-            for way, r in zip(ways, left, strict=True)
-        ]
+        at_tip = [moved(way, r[:, on]) for way, r in zip(ways, left, strict=True)]
         if any(np.isfinite(a).any() for a in at_tip):
             swinging = _swinging(problem, on, left) if kind in ("tip", "encoder") else (0.0, 0.0)
             out[kind] = unexplained_of(problem, kind, at_tip, swinging)
     return out
+
+
+def moved(way: Floats, left: Floats) -> Floats:
+    """Motion (n, 3) of the tip, mm, by channels (n, c) that move it by way (n, 3, c); those that a run lacks are left out.
+
+    A run may know the way across its path alone, or have some of the encoders.
+    """
+    known = np.isfinite(left).any(axis=0)
+    if not known.any():
+        return np.full((len(left), 3), np.nan)
+    return np.asarray(np.einsum("nij,nj->ni", way[:, :, known], left[:, known]))
 
 
 def _swinging(problem: Problem, on: slice, left: Sequence[Floats]) -> tuple[float, float]:
