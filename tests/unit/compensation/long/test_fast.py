@@ -1,6 +1,7 @@
 """Compiled reading and writing of plain lines: the same as the interpreter and the writer of whole programs."""
 
-import numba
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -12,6 +13,7 @@ from camcomp.gcode.output import Output
 from camcomp.gcode.rewrite import rewrite
 from camcomp.gcode.text import Text
 from camcomp.ground.datatypes import LINE, RAPID
+from camcomp.ground.linked_code import dispatcher
 
 HEAD = "G21 G90 G94\nG0 X1 Y2 Z3 F500\n"
 RESOLUTION = 0.001
@@ -114,12 +116,15 @@ def test_a_line_cut_off_by_the_buffer_is_left_for_the_next_one(cut):
 # --- numbers ----------------------------------------------------------------------------------------------------------
 
 
-@numba.njit
+compiled_anew = partial(dispatcher, allocates=False)  # with what it calls, which kernels from the disk leave uncompiled
+
+
+@compiled_anew
 def decimal(out, value, digits):
     return put_decimal(out, 0, value, digits, True)
 
 
-@numba.njit
+@compiled_anew
 def feed(out, value):
     return put_feed(out, 0, value, False)
 
