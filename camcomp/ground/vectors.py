@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 
 
 def distinct(values: np.ndarray) -> list[Any]:
@@ -26,6 +26,13 @@ def largest(vectors: Floats) -> Floats:
     out: Floats = np.abs(vectors[:, 0])
     for k in range(1, vectors.shape[1]):
         out = np.maximum(out, np.abs(vectors[:, k]))
+    return out
+
+
+def largest_of_groups(values: Floats, group: Ints, groups: int) -> Floats:
+    """The largest of values (k,) >= 0 without NaN in each of some groups, group (k,) of every value; 0 without values."""
+    out = np.zeros(groups)
+    np.fmax.at(out, group, values)
     return out
 
 

@@ -72,7 +72,11 @@ class InterpolatedMachine:
             passes=np.zeros(n, np.int64), x=np.zeros((0, 0, 0)), F=np.zeros((0, 0, 6)), commanded_rotation=held,
             wrench=np.zeros((n, 6)),
         )  # fmt: skip
-        return self._with_exact(out, np.flatnonzero(tile < 0), mode=mode, near=near, force=force, rho=rho)
+        if len(lost := np.flatnonzero(tile < 0)):
+            self._exact += len(lost)
+            exact = solve(self.machine, mode, near[lost], force=force[lost], rho=None if rho is None else rho[lost])
+            out = out.with_rows(lost, exact)
+        return out
 
     def near(self, target: Floats, force: Floats, ends: Bools) -> Near:
         """Response around targets (n, 3) under forces (n, 3); at the `ends` (n,) with drives, tilt and set-points."""
@@ -136,15 +140,6 @@ class InterpolatedMachine:
         if self._field is None:
             self._field = Field(self.machine, force, self._middle, TileFiles(self.machine))
         return self._field
-
-    def _with_exact(
-        self, state: State, rows: Ints, *, mode: int, near: Floats, force: Floats, rho: Floats | None
-    ) -> State:
-        if not len(rows):
-            return state
-        self._exact += len(rows)
-        own = solve(self.machine, mode, near[rows], force=force[rows], rho=None if rho is None else rho[rows])
-        return state.with_rows(rows, own)
 
     def proof(self, target: Floats, force: Floats) -> tuple[Interpolation | None, int]:
         """Differences of a sample of targets (n, 3) under forces (n, 3) to their exact solutions, and the most iterations.

@@ -35,7 +35,7 @@ from camcomp.compensation.program.moves import (
     travel_of,
     without_shared_ends,
 )
-from camcomp.compensation.program.orienting import MOST_TILT_RAD, Orienting, refuse_unfollowed
+from camcomp.compensation.program.orienting import MOST_TILT_RAD, Orienting, aim_along, refuse_unfollowed
 from camcomp.compensation.program.policy import shares_of
 from camcomp.compensation.program.posture import check_posture
 from camcomp.compensation.program.result import Interpolation
@@ -55,12 +55,12 @@ from camcomp.gcode.rewrite import rewrite
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.progress import part as part_of_work
 from camcomp.ground.records import dataclass, replace
-from camcomp.ground.vectors import largest, sizes
+from camcomp.ground.vectors import largest, largest_of_groups, sizes
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
-from camcomp.model.motion.response import acting_force, aim_at
+from camcomp.model.motion.response import acting_force
 from camcomp.model.signal_path import has_memory
 from camcomp.model.statics.target import Correction
 
@@ -211,7 +211,7 @@ class _Correction:
             curve = np.column_stack((curve, self.aimed.words * length))
             self.kept &= self.orienting.kept(track, trial, self.aimed.words)
         self.second = second_derivative(trial, curve)
-        most = _largest(track, trial, sizes(correction))
+        most = largest_of_groups(sizes(correction), trial.piece, len(track.motion))
         self.goal = error_goals(self.tolerance_um, self.step, most)
         self.budget = chord_budget(self.goal, self.step)
         if self.shares is not None:
@@ -232,12 +232,12 @@ class _Correction:
             asked = np.argsort(order, kind="stable")[: len(piece)][of]
             piece, w = np.concatenate((piece, between))[order], np.concatenate((w, at))[order]
         target, travel = track.points(piece, w), travel_of(job, track, piece, w)
-        words = np.zeros((len(nodes.piece), 3))
-        if orienting is None:
-            result = aim_at(job, target, travel, self.method, tips_only=True)
-        else:
+        result, turned = aim_along(
+            job, track, orienting, target, travel, piece=piece, w=w, method=self.method, tips_only=True
+        )
+        words = np.zeros((len(nodes.w), 3))
+        if orienting is not None:
             words = orienting.programmed(track, nodes.piece, nodes.w)
-            result, turned = orienting.aim(target, travel, orienting.programmed(track, piece, w))
             words[on] = turned[asked]
         status = result.status
         if self.part is not None:  # the others are refused as parts of their own
@@ -358,11 +358,10 @@ class _Correction:
         size = np.where(after.status == 0, sizes(missed), np.inf)
         if after.tilt is not None:
             size = np.maximum(size, np.nan_to_num(after.tilt) * self.goal[points.piece] / MOST_TILT_RAD)
-        worst = np.zeros(len(self.goal))
-        np.maximum.at(worst, points.piece[points.judged], size[points.judged])
         return _Division(
-            rows=rows, written=written, points=points, commanded=told, after=after, missed=missed, worst=worst
-        )
+            rows=rows, written=written, points=points, commanded=told, after=after, missed=missed,
+            worst=largest_of_groups(size[points.judged], points.piece[points.judged], len(self.goal)),
+        )  # fmt: skip
 
     def _rewritten(self, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Rewritten:
         return rewrite(
@@ -458,15 +457,8 @@ def _spacing(job: Job) -> float:
     return min([FINE_MM, *waves]) if job.causes else COARSE_MM
 
 
-def _largest(track: Track, nodes: Nodes, size: Floats) -> Floats:
-    """The largest of sizes (k,) at the nodes of every piece (p,)."""
-    out = np.zeros(len(track.motion))
-    np.maximum.at(out, nodes.piece, size)
-    return out
-
-
 def _kept(track: Track, nodes: Nodes, correction: Floats, half: float) -> Bools:
     """Pieces (p,) that stay as programmed, arcs as arcs: whole motions whose correction (k, 3) would be rounded away."""
-    most = _largest(track, nodes, largest(correction))
+    most = largest_of_groups(largest(correction), nodes.piece, len(track.motion))
     out: Bools = (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
     return out

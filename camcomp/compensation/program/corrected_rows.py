@@ -10,6 +10,7 @@ from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.arcs_out import Arcs
 from camcomp.compensation.program.chords import Nodes
 from camcomp.compensation.program.moves import refuse_unsolved, row_layout, travel_of
+from camcomp.compensation.program.orienting import Orienting, aim_along
 from camcomp.gcode.output import Output
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
@@ -17,10 +18,8 @@ from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
-from camcomp.model.motion.response import aim_at
 
 if TYPE_CHECKING:
-    from camcomp.compensation.program.orienting import Orienting
     from camcomp.compensation.program.policy import Shares
 
 
@@ -46,6 +45,11 @@ class CorrectedRows:
         """Signed angles (N,) rad of the moves that are arcs, corrected or as programmed; 0 for lines."""
         out: Floats = np.where(self.arcs.on, self.arcs.angle, path.angle[self.motion])
         return np.where(self.kind == ARC, out, 0.0)
+
+    def centres(self, path: Path, corrected: Floats) -> Floats:
+        """Centres (N, 3) mm of the moves that are arcs, as `corrected` (N, 3) has them or as programmed."""
+        programmed = (self.kind == ARC) & ~np.isfinite(corrected[:, 0])
+        return np.where(programmed[:, None], path.centre.take(self.motion, axis=0), corrected)
 
 
 def corrected_rows(
@@ -112,14 +116,11 @@ def _behind_cuts(
 ) -> tuple[Floats, Floats]:
     """Commanded tips (e, 3) mm behind the cuts of pieces (e,), without their force, and words (e, 3) of the orientation."""
     one = np.ones(len(piece))
-    target, turned = track.points(piece, one), np.zeros((len(piece), 3))
+    target, none = track.points(piece, one), np.zeros((len(piece), 3))
     if not len(piece):
-        return target, turned
-    unloaded = replace(travel_of(job, track, piece, one), force=np.zeros((len(piece), 3)))
-    if orienting is None:
-        result = aim_at(job, target, unloaded, "newton", tips_only=True)
-    else:
-        result, turned = orienting.aim(target, unloaded, orienting.programmed(track, piece, one))
+        return target, none
+    unloaded = replace(travel_of(job, track, piece, one), force=none)
+    result, turned = aim_along(job, track, orienting, target, unloaded, piece=piece, w=one, tips_only=True)
     refuse_unsolved(program, track, piece, target, result.status)
     if shares is None:
         return result.commanded, turned
@@ -142,8 +143,7 @@ def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
 
 def times_of(job: Job, program: Program, rows: CorrectedRows, s: Floats) -> Floats:
     """Time (N,) s at end points by the programmed feed, s (N,) mm along the path; rapids take none."""
-    feed = program.path.feed[rows.motion]
-    speed = np.where(np.isnan(feed), job.config.process.feed_mm_per_min or np.nan, feed)
+    speed = job.conditions.feeds(program.path.feed[rows.motion])
     moving = (rows.kind != RAPID) & (speed > 0.0)
     out: Floats = np.cumsum(np.where(moving, np.diff(s, prepend=0.0) / np.where(moving, speed, 1.0) * 60.0, 0.0))
     return out
@@ -151,12 +151,7 @@ def times_of(job: Job, program: Program, rows: CorrectedRows, s: Floats) -> Floa
 
 def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Output:
     """The rows in the form of the writer. rest, apart (N,): force a stop at the end, forbid merging."""
-    arc, bent = rows.kind == ARC, rows.arcs.on
-    centre = rows.arcs.centre.copy()
-    kept = np.flatnonzero(arc & ~bent)
-    centre[kept] = path.centre[rows.motion[kept]]
     return Output(
-        motion=rows.motion, kind=rows.kind.astype(np.int8), end=rows.end, centre=centre,
-        angle=rows.sweeps(path), feed=rows.feed, joining=rows.joining,
-        rest=rest, apart=apart, words=rows.words,
+        motion=rows.motion, kind=rows.kind.astype(np.int8), end=rows.end, centre=rows.centres(path, rows.arcs.centre),
+        angle=rows.sweeps(path), feed=rows.feed, joining=rows.joining, rest=rest, apart=apart, words=rows.words,
     )  # fmt: skip

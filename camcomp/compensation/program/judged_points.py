@@ -16,7 +16,7 @@ from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.path_geometry import between_ends
 from camcomp.ground.records import dataclass, fields, replace
-from camcomp.ground.vectors import sizes
+from camcomp.ground.vectors import largest_of_groups, sizes
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_pose, respond
@@ -54,9 +54,7 @@ class JudgedPoints:
         end, row = np.flatnonzero(self.end), self.row[at]
         middle, before, behind = (error.take(each, axis=0) for each in (at, end[row - 1], end[row]))
         sag = sizes(middle - 0.5 * (before + behind))
-        out = np.zeros(pieces)
-        np.fmax.at(out, self.piece[at], sag)
-        return out
+        return largest_of_groups(sag, self.piece[at], pieces)
 
     def along(self, ends: Floats, arcs: Arcs) -> Floats:
         """Points (k, 3) of the moves between end points (N, 3)."""

@@ -140,7 +140,7 @@ def minutes_of(job: Job, path: Path) -> Floats:
 
 def _speeds(job: Job, path: Path) -> Floats:
     """Feeds (n,) mm/min of motions, RAPID_FEED for rapids and where none is known."""
-    feed = np.where(np.isnan(path.feed), job.config.process.feed_mm_per_min or np.nan, path.feed)
+    feed = job.conditions.feeds(path.feed)
     return np.where((path.kind == RAPID) | ~(feed > 0.0), RAPID_FEED, feed)
 
 

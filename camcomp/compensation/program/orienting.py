@@ -15,7 +15,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints, Path
 from camcomp.ground.errors import ConfigError, ProgramError
 from camcomp.ground.orientation import RPY, UPRIGHT, VECTOR, between
 from camcomp.ground.records import dataclass, replace
-from camcomp.ground.vectors import sizes
+from camcomp.ground.vectors import largest_of_groups, sizes
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_at, respond, without_drives
@@ -125,9 +125,7 @@ class Orienting:
         """Pieces (p,) on which the correction turns the tool by less than TILT_RAD."""
         own = self.programmed(track, nodes.piece, nodes.w)
         turned = tilts(self.platform(words), self.platform(own))
-        most = np.zeros(len(track.motion))
-        np.maximum.at(most, nodes.piece, turned)
-        out: Bools = most <= TILT_RAD
+        out: Bools = largest_of_groups(turned, nodes.piece, len(track.motion)) <= TILT_RAD
         return out
 
     def length(self, budget_mm: float) -> float:
@@ -138,6 +136,19 @@ class Orienting:
         """Words (k, 3) at fractions (k,) of the moves to words `ends` (N, 3), the first of which begins at `before` (3,)."""
         start = np.concatenate((before[None], ends[:-1]))[row]
         return between(self.form, start, ends[row], fraction)
+
+
+def aim_along(
+    job: Job, track: Track, orienting: Orienting | None, target: Floats, travel: Travel, *, piece: Ints, w: Floats,
+    method: str = "newton", tips_only: bool = False,
+) -> tuple[Correction, Floats]:  # fmt: skip
+    """Commands for targets (k, 3), which lie at fractions w (k,) of pieces (k,), and words (k, 3) of the orientation.
+
+    The words are zero where orienting is None.
+    """
+    if orienting is None:
+        return aim_at(job, target, travel, method, tips_only=tips_only), np.zeros((len(w), 3))
+    return orienting.aim(target, travel, orienting.programmed(track, piece, w))
 
 
 def refuse_unfollowed(job: Job, method: str, part: Part | None) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Floats, Ints
-from camcomp.ground.errors import PhysicsError
+from camcomp.ground.errors import PhysicsError, raise_all
 from camcomp.ground.source_lines import named_lines
 from camcomp.model.job import Job
 from camcomp.model.statics.arm import NEAR_SINGULAR, Arm, arm_of, dexterity, follow
@@ -53,9 +53,5 @@ def _flips(job: Job, arm: Arm, line: Ints, tip: Floats, rho: Floats) -> Ints:
 
 
 def _refuse(program: Program, rule: str, text: str, lines: Ints) -> None:
-    if not len(lines):
-        return
     errors = [PhysicsError(rule, f"{text} on this line", at=program.text.place(int(n) - 1, 0)) for n in lines[:20]]
-    first, *rest = errors
-    first.others = tuple(rest)
-    raise first
+    raise_all(errors)

@@ -194,7 +194,6 @@ def under_control(
     told, missed (k, 3) mm: written program and its tip errors at the points. rest, apart (N,): forced stops, unmerged lines.
     tolerance_um: beyond which the controller is warned of.
     """
-    path = program.path
     moves = written_moves(program, job, rows, written, rest)
     if apart is not None:
         moves = replace(moves, merge=np.where(apart, 0.0, moves.merge))
@@ -202,13 +201,12 @@ def under_control(
     row = points.row[judged]
     joining = np.concatenate((rows.joining, [False]))
     on_moves = PointsOnMoves(
-        move=row, commanded=told.take(judged, axis=0), error=missed.take(judged, axis=0), line=path.line[rows.motion[row]],
-        joined=joining[row - 1] | joining[row + 1],
+        move=row, commanded=told.take(judged, axis=0), error=missed.take(judged, axis=0),
+        line=program.path.line[rows.motion[row]], joined=joining[row - 1] | joining[row + 1],
     )  # fmt: skip
-    cuts = np.flatnonzero((path.kind != RAPID) & ~path.machine)
     return UnderControl(
         programmed=programmed_moves(program, job), written=moves, limits=limits_of(job.config),
-        tolerance_mm=1e-3 * tolerance_um, modes=modes_of(program.modes, cuts), points=on_moves, rest=rest,
+        tolerance_mm=1e-3 * tolerance_um, modes=modes_of(program), points=on_moves, rest=rest,
         apart=apart is not None,
     )  # fmt: skip
 
@@ -227,10 +225,10 @@ def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um
     return off(free) < 0.9 * off(merged) and free.duration_s < LOST_TIME * merged.duration_s
 
 
-def modes_of(modes: Sequence[PathMode], motions: Ints) -> tuple[PathMode, ...]:
-    """The modes of some motions, in the order in which they come."""
-    known, which = numbered(modes)
-    of = which[motions]
+def modes_of(program: Program) -> tuple[PathMode, ...]:
+    """The modes of the cuts of a program, in the order in which they come."""
+    known, which = numbered(program.modes)
+    of = which[(program.path.kind != RAPID) & ~program.path.machine]
     return distinct(known[k] for k in of[np.diff(of, prepend=-1) != 0])
 
 
@@ -241,30 +239,24 @@ def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:
 
 def programmed_moves(program: Program, job: Job) -> ToolMoves:
     """The moves of a program, with the feed of the machine file where none is in force."""
-    feed = program.path.feed
-    default = job.config.process.feed_mm_per_min or np.nan
-    return moves_of(program.path, program.modes, np.where(np.isnan(feed), default, feed), program.per_turn)
+    return moves_of(program.path, program.modes, job.conditions.feeds(program.path.feed), program.per_turn)
 
 
 def written_moves(program: Program, job: Job, rows: CorrectedRows, written: Rewritten, rest: Bools) -> ToolMoves:
     """The moves of a program that was corrected as they are written, with stops at end points `rest` (N,)."""
-    feed = job.config.process.feed_mm_per_min or np.nan  # where none is in force
     path = program.path
     motion, arc = rows.motion, rows.kind == ARC
     bent = np.isfinite(written.centre[:, 0])
     end = written.end
     start = np.concatenate((path.start[motion[:1]], end[:-1]))
-    centre, axis = written.centre.copy(), path.axis.take(motion, axis=0)
-    kept = np.flatnonzero(arc & ~bent)
-    centre[kept] = path.centre[motion[kept]]
+    centre, axis = rows.centres(path, written.centre), path.axis.take(motion, axis=0)
     angle = rows.sweeps(path)
     angle[bent] = arcs_out.stated_sweeps(start[bent], end[bent], centre[bent], axis[bent], angle[bent])
     exact, stop, tolerance, merged = mode_columns(program.modes)
-    told = np.where(np.isnan(written.feed), feed, written.feed)
     return ToolMoves(
         kind=np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64), start=start, end=end,
-        centre=centre, axis=axis, angle=angle, feed=told, exact=exact[motion] | rest, waits=_waits(program, rows),
-        stop=(stop | path.machine)[motion], tolerance=tolerance[motion], merge=merged[motion],
+        centre=centre, axis=axis, angle=angle, feed=job.conditions.feeds(written.feed), exact=exact[motion] | rest,
+        waits=_waits(program, rows), stop=(stop | path.machine)[motion], tolerance=tolerance[motion], merge=merged[motion],
         per_turn=program.per_turn[motion],
     )  # fmt: skip
 
@@ -296,10 +288,8 @@ def of_text(
         ControlAccount.of(programmed_moves(original, job), limits),
         ControlAccount.of(programmed_moves(corrected, job), limits, points=points),
     ]
-    path = original.path
-    modes = modes_of(original.modes, np.flatnonzero((path.kind != RAPID) & ~path.machine))
     waits = [waiting_s(job.config, each.dwelt_s, each.tool_changes) for each in (original, corrected)]
-    return control_figures(modes, accounts, waits)
+    return control_figures(modes_of(original), accounts, waits)
 
 
 def control_figures(

@@ -7,6 +7,7 @@ not counted.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,9 @@ from camcomp.compensation.program.moves import (
     row_layout,
     travel_of,
 )
-from camcomp.compensation.program.orienting import Orienting
+from camcomp.compensation.program.orienting import Orienting, aim_along
 from camcomp.compensation.program.policy import Shares, shares_of
-from camcomp.compensation.program.result import ErrorSize, LineResult, Verification
+from camcomp.compensation.program.result import ErrorSum, LineResult, Verification
 from camcomp.compensation.program.uncertainty import Uncertainty
 from camcomp.compensation.program.under_control import of_text
 from camcomp.gcode.program import Program
@@ -33,7 +34,7 @@ from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 from camcomp.ground.progress import part, steps
 from camcomp.ground.records import dataclass, field, replace
-from camcomp.ground.vectors import sizes
+from camcomp.ground.vectors import largest_of_groups, sizes
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_at, respond
@@ -65,13 +66,10 @@ class Verified:
 
     def figures(self, tolerance_um: float) -> Verification:
         """The figures of a verification."""
-        size = 1e3 * self.residual
-        residual = ErrorSize(
-            rms_um=float(np.sqrt(np.mean(size**2))) if len(size) else 0.0,
-            max_um=float(size.max()) if len(size) else 0.0,
-        )
+        total = ErrorSum()
+        total.add(self.residual[:, None])
         return Verification(
-            tolerance_um=tolerance_um, residual=residual, points=len(size), joining_lines=self.joining,
+            tolerance_um=tolerance_um, residual=total.figures(), points=len(self.residual), joining_lines=self.joining,
             **self.control, warnings=self.warnings,
             **({} if self.totals is None else band_figures(self.totals, self.policy)), lines=tuple(self.lines),
         )  # fmt: skip
@@ -167,11 +165,8 @@ class _Programmed:
 
     def aimed(self, piece: Ints, w: Floats) -> Correction:
         """Commands for the programmed points, as compensate has them."""
-        job, track, orienting = self.job, self.track, self.orienting
-        target, travel = track.points(piece, w), travel_of(job, track, piece, w)
-        if orienting is None:
-            return aim_at(job, target, travel, "newton")
-        return orienting.aim(target, travel, orienting.programmed(track, piece, w))[0]
+        target, travel = self.track.points(piece, w), travel_of(self.job, self.track, piece, w)
+        return aim_along(self.job, self.track, self.orienting, target, travel, piece=piece, w=w)[0]
 
     def commanded(self, w: float) -> Floats:
         """Commanded tip (p, 3) at fraction w of every piece, as compensate would have it."""
@@ -324,12 +319,7 @@ class _Points:
         convergence = sizes(tip - target)
         numbers, at = np.unique(program.path.line[track.motion[piece]], return_inverse=True)
         rounding = 0.5 * np.sqrt(3.0) * 1e3 * program.step_mm(job.config.control.resolution_mm)
-
-        def largest(values: Floats, rows: Ints) -> Floats:
-            out = np.zeros(len(numbers))
-            np.maximum.at(out, rows, values)
-            return out
-
+        largest = partial(largest_of_groups, groups=len(numbers))
         moves = np.bincount(at[vertex], minlength=len(numbers))
         whole, at_ends = largest(residual, at), largest(residual[vertex], at[vertex])
         columns = np.column_stack((whole, largest(convergence, at[vertex]), at_ends, np.maximum(0.0, whole - at_ends)))

@@ -12,7 +12,7 @@ from camcomp.compensation.program.under_control import mode_name
 from camcomp.compensation.program.verify import Verified
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.ground.records import dataclass
-from camcomp.ground.vectors import sizes
+from camcomp.ground.vectors import largest_of_groups, sizes
 from camcomp.model.job import Job
 from camcomp.report.plot import (
     BAR_MARGIN,
@@ -86,9 +86,7 @@ def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
     rows = result.rows
 
     def largest(error: Floats, row: Ints) -> Floats:
-        out = np.zeros(len(rows.w))
-        np.fmax.at(out, row, 1e3 * sizes(error))
-        return out
+        return largest_of_groups(1e3 * sizes(error), row, len(rows.w))
 
     drive_scale = np.where(job.machine.revolute, 1e-3, 1.0)
     return DrawnPath(

@@ -27,7 +27,7 @@ from camcomp.compensation.report.machine_drawing import figure_machine
 from camcomp.compensation.report.wall_drawing import wall_section
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.vectors import sizes
+from camcomp.ground.vectors import largest_of_groups, sizes
 from camcomp.model.config.in_force import values_in_force
 from camcomp.model.control import setup_of
 from camcomp.model.job import Job
@@ -179,8 +179,7 @@ def _lines(drawn: DrawnPath, job: Job, checked: Verified) -> Table:
     shown = ~drawn.hidden
     numbers = np.unique(drawn.line[shown])
     if len(numbers) > MOST_LINES:
-        peak = np.zeros(int(numbers.max()) + 1)
-        np.maximum.at(peak, drawn.line[shown], size[shown])
+        peak = largest_of_groups(size[shown], drawn.line[shown], int(numbers.max()) + 1)
         numbers = np.sort(numbers[np.argsort(-peak[numbers], kind="stable")[:MOST_LINES]])
         caption = f"The {MOST_LINES} source lines with the largest corrections"
     else:

@@ -67,6 +67,10 @@ class Conditions:
         """The tool of a T number."""
         return self.tools.get(tool, Edges(self.diameter_mm, self.teeth))
 
+    def feeds(self, feed: Floats) -> Floats:
+        """Feeds (n,) mm/min of a program, that of the machine file where none is in force."""
+        return np.where(np.isnan(feed), self.feed_mm_per_min or np.nan, feed)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Track:
@@ -284,8 +288,7 @@ def _components(
     if c.model is None:
         return np.zeros((len(motion), 3))
     feed, speed = path.feed[motion] if driven is None else driven, path.speed[motion]
-    feed = np.where(np.isnan(feed), c.feed_mm_per_min or np.nan, feed)
-    speed = np.where(speed > 0.0, speed, c.spindle_rpm or 0.0)
+    feed, speed = c.feeds(feed), np.where(speed > 0.0, speed, c.spindle_rpm or 0.0)
     tool = path.tool[motion]
     out = np.zeros((len(motion), 3))
     for number in np.unique(tool) if c.tools else [None]:

@@ -171,7 +171,7 @@ def cutting_forces(
     middle = np.where(size > 0.2, middle / np.maximum(size, 1e-12), after)
     as_told = (np.sum(middle * programmed, axis=1) > _AGREE) | (np.linalg.norm(middle, axis=1) == 0.0)
     still = np.full(len(tip), LEAST_FEED)
-    feed, behind, ahead = driven_feeds(tip, time, _programmed_feeds(track, motion))
+    feed, behind, ahead = driven_feeds(tip, time, track.conditions.feeds(track.path.feed[motion]))
     told, chord = track.force(piece, w, feed), track.force_along(piece, w, programmed, feed)
     force = np.where(as_told[:, None], told, track.force_along(piece, w, middle, feed))
     force[~on] = 0.0
@@ -180,7 +180,10 @@ def cutting_forces(
     thicker = np.abs(track.force_along(piece, w, programmed, ahead) - track.force_along(piece, w, programmed, behind))
     turning = np.maximum(turning, np.where(on[:, None], thicker, 0.0))
     # the speed around a stop between rows is unknown
-    most, least = (track.force_along(piece, w, programmed, each) for each in (_programmed_feeds(track, motion), still))
+    most, least = (
+        track.force_along(piece, w, programmed, each)
+        for each in (track.conditions.feeds(track.path.feed[motion]), still)
+    )
     stopped = (on & _beside_stops(motion, rests))[:, None]
     turning = np.maximum(turning, np.where(stopped, 0.5 * np.abs(most - least), 0.0))
     unsteady = _unsteady(before, after, as_told)[:, None] * np.linalg.norm(force, axis=1, keepdims=True) / np.sqrt(3.0)
@@ -255,11 +258,6 @@ def driven_feeds(tip: Floats, time: Floats, programmed: Floats) -> tuple[Floats,
     behind, ahead = speed(left, here), speed(here, right)
     told = (behind == programmed) | (ahead == programmed)
     return np.where(told, programmed, speed(left, right)), behind, ahead
-
-
-def _programmed_feeds(track: Track, motion: Ints) -> Floats:
-    feed = track.path.feed[motion]
-    return np.where(np.isnan(feed), track.conditions.feed_mm_per_min or np.nan, feed)
 
 
 def _beside(at: Floats) -> tuple[Ints, Ints]:
