@@ -212,16 +212,35 @@ def test_joints_that_move_together_do_not_bend_each_others_friction(tmp_path):
             assert low <= true <= high and high - low < 0.2 * true
 
 
-def test_friction_that_turns_round_with_the_speed_is_no_stribeck_friction(tmp_path):
+@pytest.mark.parametrize(
+    "turned",
+    [lambda v: np.clip(v / 0.004, -1.0, 1.0), lambda v: np.tanh(v / 0.02), np.sign],
+    ids=["as a polygon", "smoothly", "at once"],
+)
+def test_friction_that_turns_round_with_the_speed_is_no_stribeck_friction(tmp_path, turned):
     (tmp_path / "arm.yaml").write_text(TWO_LINKS)
     for name, seed in (("a", 1), ("b", 5)):
-        two_link_log(tmp_path, name, seed, turned=lambda speed: np.clip(speed / 0.004, -1.0, 1.0))
+        two_link_log(tmp_path, name, seed, turned=turned)
     result = asked(tmp_path, ["arm.yaml"], "ab", holdout=["b"])
     for k, joint in enumerate(("J1", "J2")):
         (friction,) = [c for c in result.causes if c.target == joint]
         assert not any(name.startswith("stribeck") for name in friction.parameters)
         low, high = friction.parameters["force_Nmm"].ci95
         assert low <= 1e3 * RUBS[k, 0] <= high
+
+
+def test_stribeck_friction_that_turns_round_with_the_speed_is_found(tmp_path):
+    (tmp_path / "arm.yaml").write_text(TWO_LINKS)
+    for name, seed in (("a", 1), ("b", 5)):
+        two_link_log(
+            tmp_path, name, seed, turned=lambda v: (1.0 + 0.3 * np.exp(-((v / 0.06) ** 2))) * np.tanh(v / 0.01)
+        )
+    result = asked(tmp_path, ["arm.yaml"], "ab", holdout=["b"])
+    for k, joint in enumerate(("J1", "J2")):
+        (friction,) = [c for c in result.causes if c.target == joint]
+        for name, true in (("stribeck_Nmm", 300.0 * RUBS[k, 0]), ("stribeck_rad_per_s", 0.06)):
+            low, high = friction.parameters[name].ci95
+            assert low <= true <= high and high - low < 0.4 * true
 
 
 def test_an_arm_with_stated_masses_may_stand_still_in_a_run(tmp_path):

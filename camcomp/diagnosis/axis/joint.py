@@ -32,7 +32,7 @@ from camcomp.diagnosis.axis.effect_columns import AxisCause, DrivenAxis, candida
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun, ChannelRun
 from camcomp.diagnosis.axis.gate import WITHIN, AxisGate, judge, not_known
 from camcomp.diagnosis.axis.linear_sets import CAUSES
-from camcomp.diagnosis.axis.row_noise import log_gain
+from camcomp.diagnosis.axis.row_noise import left_of_fit, log_gain
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.axis.terms import TURNS_MM_PER_S, AxisTravel, ripple
 from camcomp.diagnosis.law.words import law_sum
@@ -43,7 +43,7 @@ from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import PRESLIDING_MM
 
 TURNS_MM = (1e-4, 0.003, 0.02, 0.1)  # ways over which the friction of a slide turns round in its following error
-CORNERS_MM_PER_S = (0.3, 1.5, 5.0, 15.0)  # of a polygon over the speed by which the friction of a hinge turns round
+CORNERS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0)  # times the speed at which a hinge's friction turns round: of a polygon
 CREEP = 0.02  # of the fastest row: speed at which Coulomb friction has turned round
 
 
@@ -177,6 +177,7 @@ def _healthy(
         around.bodies(found.name, *each, found.wide) for each in zip(rows.runs, rows.moves, strict=True) if behind
     ]
     base = base_of([bodies[k][0] for k in rows.train if behind] or [np.zeros((1, 0))])
+    turns = _turns_at(rows, [bodies[k][0] @ base for k in rows.train]) if behind else None
     out, inertia = [], []
     for k, m in enumerate(rows.moves):
         angle = m.position / lever_mm(True)
@@ -198,7 +199,7 @@ def _healthy(
         if rows.asymmetric:
             own["asymmetry"] = np.abs(m.speed)[:, None]
         if force:
-            own[TURNING] = _turning(m, hinge)
+            own[TURNING] = _turning(m, turns)
         moved = {kind: own[kind] for kind in own if kind == ACCELERATION}
         if force and hinge:
             every, still = bodies[k]
@@ -210,10 +211,33 @@ def _healthy(
     return out, inertia
 
 
-def _turning(m: AxisTravel, hinge: bool) -> Floats:
-    """Friction that turns round with the speed, in a hinge by any polygon, minus the one that does over a distance, (n, q)."""
+def _turns_at(rows: ChannelData, bodies: Sequence[Floats]) -> float:
+    """Speed at which the friction of a hinge turns round: v_0 of the tanh(v / v_0) that leaves least of the fitted runs' torque.
+
+    It is among the speeds below which a quarter, an eighth, a sixteenth and so on of the rows are. bodies (n, b) per fitted run.
+    """
+    moves = [rows.moves[k] for k in rows.train]
+    torque = np.concatenate([rows.values[k] for k in rows.train])
+    speed, acceleration = np.concatenate([m.speed for m in moves]), np.concatenate([m.acceleration for m in moves])
+    shares = 0.5 ** np.arange(2.0, np.log2(len(speed)))
+    scales = np.maximum(np.quantile(np.abs(speed), shares), 1e-12)
+    others = np.column_stack([np.ones(len(speed)), speed, acceleration, np.concatenate(bodies)])
+    left = left_of_fit(others, np.column_stack([torque, np.tanh(speed[:, None] / scales)]))
+    square = np.sum(left[:, 1:] ** 2, axis=0)
+    gain = np.divide((left[:, 0] @ left[:, 1:]) ** 2, square, out=np.zeros(len(scales)), where=square > 0.0)
+    return float(scales[np.argmax(gain)])
+
+
+def _turning(m: AxisTravel, turns: float | None) -> Floats:
+    """Friction that turns round with the speed, minus the one that does over a distance, (n, q).
+
+    turns: speed about which it does by any polygon, in a hinge; None in a slide, where it may do at several speeds.
+    """
     speed = m.speed[:, None]
-    turned = np.clip(speed / CORNERS_MM_PER_S, -1.0, 1.0) if hinge else np.tanh(speed / TURNS_MM_PER_S)
+    if turns is None:
+        turned = np.tanh(speed / TURNS_MM_PER_S)
+    else:
+        turned = np.clip(speed / (turns * np.array(CORNERS)), -1.0, 1.0)
     return np.asarray(turned - m.reversal(PRESLIDING_MM)[:, None])
 
 
