@@ -74,7 +74,7 @@ def far_off(size: Floats, time: Floats) -> np.ndarray:
     IN_A_ROW of them one after the other are no mistakes either.
     """
     far = size > _most(size)
-    if far.sum() > max(MANY * len(far), 1.0):  # one of a few poses may be a mistake as well
+    if far.sum() > np.ceil(MANY * len(far)):  # one of a few poses may be a mistake as well
         return np.zeros(len(size), bool)
     order = np.argsort(time, kind="stable")
     for run in np.split(order, np.flatnonzero(np.diff(far[order].astype(int))) + 1):

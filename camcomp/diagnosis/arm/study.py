@@ -38,6 +38,7 @@ from camcomp.model.statics.description import Robot
 from camcomp.model.statics.masses import has_moved_mass
 
 MOST_POSES = 1200  # of a campaign; more are drawn from
+PASSES = 4  # of a robust fit; the next one changes no outlier
 MANY = 4  # causes from which on a joint that was shifted for a while is looked for
 LOOSE_FRAME = 1e-3  # ratio of singular values of a frame's columns below which rows do not fix it
 
@@ -90,8 +91,6 @@ def cleaned(
 ) -> tuple[ArmBench, Shelf, list[tuple[str, int]], list[Floats]]:
     """Bench without poses that are outliers of the richest model, and factors (n,) on the noise of rows with large
     residuals.
-
-    Weights of Huber, Ann. Math. Stat. 35 (1964) 73; the scale is that of the median.
     """
     bench = ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted)
     shelf = Shelf.of(bench.columns(without))
@@ -99,24 +98,41 @@ def cleaned(
     outliers: list[tuple[str, int]] = []
     weights = []
     for k, rest in enumerate(left):
-        poses, size = campaigns[k], np.linalg.norm(rest, axis=1)
-        far = far_off(size, poses.time)
+        poses = campaigns[k]
+        far = far_off(np.linalg.norm(rest, axis=1), poses.time)
         outliers += named_rows(poses, far)
         campaigns[k] = poses.take(~far)
-        square = size[~far] ** 2
-        scale = max(float(np.median(square)) / chi2.median(3), 1e-18)
-        weights.append(np.maximum(np.sqrt(square / scale / chi2.ppf(SURELY, 3)), 1.0))
+        weights.append(huber(rest[~far]))
     return ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted), shelf, outliers, weights
 
 
+def huber(left: Floats) -> Floats:
+    """Factors (n,) >= 1 on the noise of rows with residuals (n, 3).
+
+    Huber, Ann. Math. Stat. 35 (1964) 73; the scale is that of the median.
+    """
+    square = np.sum(left**2, axis=1)
+    scale = max(float(np.median(square)) / chi2.median(3), 1e-18)
+    return np.asarray(np.maximum(np.sqrt(square / scale / chi2.ppf(SURELY, 3)), 1.0))
+
+
 def residuals_of_richest(bench: ArmBench, shelf: Shelf) -> list[Floats]:
-    """Residuals (n, 3) mm of every campaign after a ridge fit of all single effects at once, at their usual sizes."""
+    """Residuals (n, 3) mm of every campaign after a robust ridge fit of all single effects at once, at their usual sizes.
+
+    A pose far off bends a model of many columns to itself: rows count less by their residuals in PASSES fits.
+    """
     plain = shelf.without_shapes()
     model = linearise(ArmBench(robot=bench.robot, causes=bench.causes, campaigns=bench.campaigns), plain, 1.0)
-    size = max(float(np.median(np.abs(np.concatenate([g.y for g in model.groups])))), 1e-9)
+    left, groups = [g.y for g in model.groups], model.groups
     slab = {int(j): 1.0 for j in np.flatnonzero(model.size > 0.0)}
-    at = model.posterior(Background(noise=size), slab)
-    return [g.y - model.layout.design(g) @ at.mean for g in model.groups]
+    for _ in range(PASSES):
+        size = max(float(np.median(np.abs(np.concatenate(left)))), 1e-9)
+        at = model.posterior(Background(noise=size), slab)
+        left = [g.y - model.layout.design(g) @ at.mean for g in groups]
+        model = replace(
+            model, groups=tuple(replace(g, sd=g.sd * huber(r)[:, None]) for g, r in zip(groups, left, strict=True))
+        )
+    return left
 
 
 def noise_of_richest(bench: ArmBench, shelf: Shelf, weights: Sequence[Floats]) -> float:

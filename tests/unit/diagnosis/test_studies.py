@@ -90,6 +90,16 @@ def test_an_arm_that_is_its_model_has_no_cause(robot, healthy):
         assert result.gap.rms_um == pytest.approx(NOISE_UM, rel=0.1)
 
 
+def test_two_mistakes_of_millimetres_among_sixty_poses_bend_no_model_of_many_columns_to_them(robot, healthy):
+    few = healthy[0].take(np.arange(250) < 62)
+    tip, wrong = few.tip.copy(), [44, 57]
+    tip[wrong] += np.array([[3.0, -2.0, 2.5], [-4.0, 1.5, 2.0]])
+    result = arm_study(robot, (), [replace(few, tip=tip)], stated=STATED)
+    assert (result.verdict, result.causes) == ("none", ())
+    assert [each.row - 1 for each in result.outliers] == wrong
+    assert result.gap.rms_um == pytest.approx(NOISE_UM, rel=0.2)
+
+
 @pytest.mark.campaign  # the sample of the UR10 has repeats, too
 def test_the_floor_is_what_repeats_show(robot, faulty):
     again = [replace(r, tip=r.tip + 0.0, time=r.time + 500.0) for r in faulty]
