@@ -131,12 +131,14 @@ def orthoglide(seed: int) -> list[Row]:
 def hidden_laws(seed: int) -> list[Row]:
     """Experiments with a law and without one in turn, on three machines, at 10 and 3 x noise."""
     from tests.validation.recorded import hidden_laws as laws
+    from tests.validation.recorded.machines import MACHINES
+    from tests.validation.recorded.unmodelled import ON_ACTUATORS
 
     names = [*laws.TRUTH, "null"]
     effect, turn = names[seed % len(names)], seed // len(names)
     machine, ratio = ("orthoglide", "puu", "router")[turn % 3], (10.0, 3.0)[turn % 2]
     rng = np.random.default_rng([seed, 31])
-    target = str(rng.choice(laws.MACHINES[machine].actuators if effect in laws.ON_ACTUATORS else ["x", "z"]))
+    target = str(rng.choice(MACHINES[machine].actuators if effect in ON_ACTUATORS else ["x", "z"]))
     with tempfile.TemporaryDirectory() as place:
         return [laws.judged(effect, target, machine, seed, 0.0 if effect == "null" else ratio, Path(place) / "e")]
 

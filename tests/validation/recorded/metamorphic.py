@@ -175,7 +175,7 @@ def cyclic_labels(files: Files, rng: np.random.Generator) -> tuple[Files, Names]
 def mirrored_labels(files: Files, rng: np.random.Generator) -> tuple[Files, Names]:
     """The first two actuators swap their names."""
     names = list(files.machine["robot"]["chains"])
-    return _relabelled(files, dict(zip(names, [names[1], names[0], *names[2:]], strict=True)))
+    return _relabelled(files, dict(zip(names, [*names[1::-1], *names[2:]], strict=True)))
 
 
 def turned_frame(files: Files, rng: np.random.Generator) -> tuple[Files, Names]:
