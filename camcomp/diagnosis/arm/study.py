@@ -38,7 +38,7 @@ from camcomp.model.statics.description import Robot
 from camcomp.model.statics.masses import has_moved_mass
 
 MOST_POSES = 1200  # of a campaign; more are drawn from
-PASSES = 4  # of a robust fit; the next one changes no outlier
+PASSES = 4  # of a robust fit
 MANY = 4  # causes from which on a joint that was shifted for a while is looked for
 LOOSE_FRAME = 1e-3  # ratio of singular values of a frame's columns below which rows do not fix it
 

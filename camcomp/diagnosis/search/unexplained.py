@@ -74,9 +74,10 @@ def _swinging(problem: Problem, on: slice, left: Sequence[Floats]) -> tuple[floa
     """
     bench, found = problem.bench, []
     for k, values in enumerate(left):
-        size = np.ones(3) if on.start == 0 else bench.tip_sizes[k, on]
         each = zip(values[:, on].T, problem.doubt[k][:, on].T, problem.rounding[on], strict=True)
-        found.append((size**2) @ [swings(x, problem.times[k], doubt, step) for x, doubt, step in each])
+        found.append(
+            bench.tip_sizes[k, on] ** 2 @ [swings(x, problem.times[k], doubt, step) for x, doubt, step in each]
+        )
     square, noise = np.average(found, axis=0, weights=[len(values) for values in left])
     return float(square), float(noise * np.sqrt(2.0 / sum(map(len, left))))
 
