@@ -1,18 +1,21 @@
-"""Static poses of an arm that gives way under measured torques, or has a link that grows; plant: tests.validation.poses.arm."""
+"""Static poses of arms that give way under measured torques or at their base, or have a link that grows; own plants."""
 
 import numpy as np
 import pytest
 import yaml
+from scipy.spatial.transform import Rotation
 
 from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.arm.study import studied
 from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
+from tests.validation.plants import bodies
 from tests.validation.poses.arm import ROOT, Off, load_arm
 from tests.validation.poses.plant import poses
 
 SD = 0.02  # mm
+MIDDLE = np.radians([0.0, -60.0, 90.0, 0.0, 45.0, 0.0])
 ONLY = ("joint_curve", "disturbance", "link_geometry")  # effects that these tests do without, for their time
 
 
@@ -70,3 +73,24 @@ def test_a_link_that_grows_is_named(tmp_path):
     assert (cause.effect, cause.target) == ("link_growth", "shoulder_lift")
     found = cause.parameters["growth_mm_per_K"]
     assert found.ci95[0] < 0.05 < found.ci95[1]
+
+
+def test_a_carriage_that_turns_more_easily_one_way_is_named(tmp_path):
+    content = yaml.safe_load((ROOT / "config" / "kuka-kr210.yaml").read_text())
+    for joint in content["robot"]["joints"]:
+        joint.pop("stiffness_Nmm_per_rad")  # the plant's joints are rigid
+    (tmp_path / "arm.yaml").write_text(yaml.safe_dump(content))
+    arm = build_robot(load_config([tmp_path / "arm.yaml"]).robot, [0.0, 0.0, 0.0])[0]
+    soft = 1e-12 * np.array([[150.0, 20.0, 0.0], [20.0, 60.0, 0.0], [0.0, 0.0, 0.0]])
+    rng, runs = np.random.default_rng(1), []
+    for name in "ab":  # parked twice
+        q = MIDDLE + rng.uniform(-0.6, 0.6, (60, 6))
+        parked = Rotation.from_euler("z", rng.uniform(-3.0, 3.0))
+        seen = parked.apply([bodies.on_pedestal(each, np.zeros(3), soft, 0.0) for each in q])
+        tip = seen + rng.uniform(-2e3, 2e3, 3) + SD * rng.standard_normal((60, 3))
+        runs.append(Poses(label=name, q=q, tip=tip, time=60.0 * np.arange(60), temperature=None, run=np.full(60, name)))
+    result, _ = studied(arm, (), runs, without=ONLY, stated=StatedDeviation(SD))
+    (cause,) = result.causes
+    assert (result.verdict, cause.effect) == ("identified", "base_compliance")
+    for name, want in (("difference_rad_per_Nmm", 45e-12), ("cross_rad_per_Nmm", 20e-12)):
+        assert cause.parameters[name].ci95[0] < want < cause.parameters[name].ci95[1], name

@@ -65,8 +65,9 @@ def test_acceleration_of_a_constant_one_is_exact_at_any_instants(even):
     assert got == pytest.approx(np.full((len(time), 1), 6.0), rel=1e-6)
 
 
-def test_a_base_that_turns_about_its_foot_moves_the_tip_as_moments_balance(robot):
-    force, depth, soft = np.array([150.0, -80.0, -40.0]), 400.0, 1e-10
+@pytest.mark.parametrize("difference, cross", [(0.0, 0.0), (3e-11, -2e-11)])
+def test_a_base_that_turns_about_its_foot_moves_the_tip_as_moments_balance(robot, difference, cross):
+    force, depth, soft = np.array([150.0, -80.0, -40.0]), 400.0 * (difference == 0.0), 1e-10
     tip = bodies.walk(POSE)[0]
     base = shelf.load("effects", "base_compliance")
     n = np.zeros((1, 6))
@@ -83,9 +84,16 @@ def test_a_base_that_turns_about_its_foot_moves_the_tip_as_moments_balance(robot
         ordered=False,
         masses=lambda: mass_loads(robot, POSE[None], None),
     )
-    p = {"rad_per_Nmm": soft, "rad_per_N": depth * soft, "mm_per_N": 0.0}
+    p = {
+        "rad_per_Nmm": soft,
+        "rad_per_N": depth * soft,
+        "mm_per_N": 0.0,
+        "difference_rad_per_Nmm": difference,
+        "cross_rad_per_Nmm": cross,
+    }
     got = base.on_pose(tip[None], Load(force[None], np.zeros((1, 6))), motion, p)[0]
-    want = bodies.on_pedestal(POSE, force, soft, depth)
+    level = np.array([[difference, cross, 0.0], [cross, -difference, 0.0], [0.0, 0.0, 0.0]])
+    want = bodies.on_pedestal(POSE, force, soft * np.eye(3) + level, depth)
     assert np.linalg.norm(want - tip) > 0.5
     assert got - tip == pytest.approx(want - tip, abs=4e-3 * np.linalg.norm(want - tip))
 

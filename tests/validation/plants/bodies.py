@@ -48,8 +48,11 @@ def inertia_torques(motion, t: float, h: float = 1e-3) -> np.ndarray:
     return (momentum(t + h) - momentum(t - h)) / (2 * h) - np.array(by_place)
 
 
-def on_pedestal(q: np.ndarray, force: np.ndarray, rad_per_Nmm: float, depth: float) -> np.ndarray:
-    """Tip (3,) of a rigid arm whose base turns on a spring about a point `depth` below the origin of the machine."""
+def on_pedestal(q: np.ndarray, force: np.ndarray, soft: np.ndarray, depth: float) -> np.ndarray:
+    """Tip (3,) of a rigid arm whose base turns on springs about a point `depth` below the origin of the machine.
+
+    soft (3, 3): rad per N mm.
+    """
     tip, centres = walk(q)
     foot = np.array([0.0, 0.0, -depth])
     pulls = np.vstack([[[0.0, 0.0, -G * row[5]] for row in ROWS], force])
@@ -57,7 +60,7 @@ def on_pedestal(q: np.ndarray, force: np.ndarray, rad_per_Nmm: float, depth: flo
     turn = np.zeros(3)
     for _ in range(30):
         points = foot + Rotation.from_rotvec(turn).apply(np.vstack([centres, tip]) - foot)
-        turn = rad_per_Nmm * np.cross(points - foot, pulls).sum(axis=0)
+        turn = soft @ np.cross(points - foot, pulls).sum(axis=0)
     return points[-1]
 
 
