@@ -77,7 +77,7 @@ def walls_report(
 
     Raises as `simulate_cut`, ConfigError CC216 without the plot library.
     """
-    from camcomp.compensation.report.wall_page import walls_html
+    from camcomp.compensation.report.wall_drawing import walls_html
 
     source = program_in(program, machine)
     refuse_orientation(source, "the machined surface")

@@ -168,7 +168,7 @@ def _figure(figure: Figure) -> str:
             f'<input type="range" id="{name}-k" min="0" max="100" step="1">'
             f'<output id="{name}-o" for="{name}-k"></output>{plane}</div>'
         )
-    label = escape(figure.label or f"{figure.title}: {figure.caption}", quote=True)
+    label = escape(f"{figure.title}: {figure.caption}", quote=True)
     return (
         f'<figure id="{name}"><h3>{escape(figure.title)}</h3>{controls}'
         f'<div class="plot" id="{name}-plot" role="img" aria-label="{label}" '

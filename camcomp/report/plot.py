@@ -22,13 +22,18 @@ SCALE = [[0, "var(--m0)"], [0.5, "var(--m1)"], [1, "var(--m2)"]]
 
 SMALLEST_UM = 0.01  # smallest length shown in texts
 BAR_MARGIN = {"l": 70, "r": 60, "t": 34, "b": 50}  # px, with room for the label of the longest bar
+MARGIN_IN_SPACE = 0.1  # of the largest extent, around a drawing in space
+ENLARGED, MOST_ENLARGED = (
+    0.1,
+    1e5,
+)  # share of its drawing that a deviation has at first, and the largest factor of a slider
 
 Json = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """One plot of a page. label: for screen readers, by default title and caption; caption: below the plot.
+    """One plot of a page, with a caption below it; screen readers read title and caption.
 
     exaggerate: base curve and shifts of a plot whose deviations a slider enlarges: one base for all curves in one of
     `planes`, or in space a base for each curve and no planes (see assets/page.js).
@@ -37,7 +42,6 @@ class Figure:
     name: str
     title: str
     caption: str
-    label: str = ""
     traces: Sequence[Json] = ()
     layout: Mapping[str, Any] = field(default_factory=dict)
     height: int = 340
@@ -101,6 +105,43 @@ def level(name: str, x: Sequence[float], y: float) -> Json:
 def axis(title: str, **more: Any) -> Json:
     """An axis with a title."""
     return {"title": {"text": title}, **more}
+
+
+def bars(values: Sequence[float], names: Sequence[str], texts: Sequence[str]) -> Json:
+    """Horizontal bars with a text behind each."""
+    return {
+        "type": "bar", "orientation": "h", "x": list(values), "y": list(names), "text": list(texts), "textposition": "outside",
+        "marker": {"color": STYLES[0][0]}, "cliponaxis": False, "showlegend": False,
+    }  # fmt: skip
+
+
+def limit_of_bars(name: str, value: float | None, names: Sequence[str]) -> Json:
+    """A vertical line across the bars of these names."""
+    style = {"color": STYLES[1][0], "dash": "dot", "width": 2}
+    ends = {"x": [value, value], "y": [names[0], names[-1]]}
+    return {"type": "scatter", "mode": "lines", "name": name, "line": style, **ends}
+
+
+def in_space(points: Floats, eye: tuple[float, float, float]) -> Json:
+    """Layout of a drawing in space: axes of one scale around points (n, 3) mm, seen from `eye`."""
+    middle, half = 0.5 * (points.max(axis=0) + points.min(axis=0)), 0.5 * np.ptp(points, axis=0)
+    half = half + MARGIN_IN_SPACE * max(2.0 * float(half.max()), 1e-6)
+    ranges = np.column_stack((middle - half, middle + half)).round(6).tolist()
+    share = half / half.max()
+    axes = {
+        f"{a}axis": axis(f"{a} in mm", range=ranges[i], nticks=max(round(7 * share[i]), 2)) for i, a in enumerate("xyz")
+    }
+    scene = {
+        "aspectmode": "manual", "aspectratio": dict(zip("xyz", share.round(6).tolist(), strict=True)),
+        "camera": {"eye": dict(zip("xyz", eye, strict=True))},
+    }  # fmt: skip
+    return {"scene": axes | scene, "margin": {"l": 0, "r": 0, "t": 0, "b": 0}}
+
+
+def enlarged(base: Any, shifts: Sequence[Json], planes: Sequence[str], deviation: float, extent: float) -> Json:
+    """Curves and shifts of a figure whose largest deviation (mm) a slider enlarges within the extent (mm) of the drawing."""
+    first = float(np.clip(ENLARGED * extent / max(deviation, 1e-9), 1.0, MOST_ENLARGED))
+    return {"base": base, "shifts": shifts, "planes": planes, "first": first, "most": MOST_ENLARGED}
 
 
 def brief(value: float, digits: int = 3) -> str:

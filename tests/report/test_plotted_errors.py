@@ -7,7 +7,7 @@ import pytest
 
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.totals import Totals
-from camcomp.compensation.report.figures import drawn_path_of, figure_error
+from camcomp.compensation.report.figures import DrawnPath, figure_error
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.control import program_of
@@ -28,7 +28,7 @@ def test_the_plotted_error_is_that_of_the_summary(tmp_path, effects):
     job = Job(load_config([shipped("config/orthoglide-1deg.yaml"), str(tmp_path / "effects.yaml")]))
     program = program_of(TEXT.encode(), "p.nc", job.config)
     result = compensate(program, job, method="newton", tolerance_um=1.0, version="0")
-    figures, drawn = Totals.of(result, job).summary().as_json(), drawn_path_of(result, job)
+    figures, drawn = Totals.of(result, job).summary().as_json(), DrawnPath(result, job)
     for name in ("before", "after"):
         shown = getattr(drawn, name)[~drawn.hidden]
         assert shown.max() == pytest.approx(figures[name]["max_um"], rel=1e-12)

@@ -71,9 +71,8 @@ def _map(result: PlacingResult, turn: float, what: str) -> Figure:
             _markers("best", [result.best], {"size": 24, "symbol": "circle-open", "line": {"width": 3}}, "best")
         )
     return Figure(
-        name=f"map{turn:g}", title=f"Turned by {turn:g}°", caption=f"{what} by the place of the program's zero.",
-        label=f"Map of the table: {len(good)} places with what is left, {len(bad)} where the program cannot be cut.",
-        traces=traces, height=460,
+        name=f"map{turn:g}", title=f"Turned by {turn:g}°", traces=traces, height=460,
+        caption=f"{what} by the place of the program's zero: {len(good)} places, {len(bad)} where the program cannot be cut.",
         layout={"legend": {"orientation": "h", "y": 1.12}, "xaxis": axis("X of the zero, mm"), "yaxis": axis("Y of the zero, mm", scaleanchor="x")},
     )  # fmt: skip
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import LITTLE, Bands
 from camcomp.compensation.program.result import Summary
-from camcomp.compensation.report.figures import LOGARITHMIC, DrawnPath, along_path, scene_of
+from camcomp.compensation.report.figures import LOGARITHMIC, DrawnPath, along_path
 from camcomp.ground.datatypes import Bools
 from camcomp.report.page import Section, Table
-from camcomp.report.plot import STYLES, Figure, Json, brief, broken, gapped, micrometres, thin
+from camcomp.report.plot import STYLES, Figure, Json, brief, broken, micrometres, thin
 
 KINDS = ("trusted", "doubtful", "shrunk", "left alone")
 
@@ -60,7 +60,6 @@ def _figure_band(drawn: DrawnPath, bands: Bands) -> Figure:
         title="Band around the residual",
         caption=f"Between what the corrected program leaves if every number of the machine file is right, and the error that 95 % of the "
         f"machines within the stated spreads stay below: {words}. What the control merges and rounds is a curve of its own. Logarithmic scale.",
-        label=f"Plot of the residual and its 95 % band along the path: {words}.",
         traces=[between, after, driven, upper, before],
         layout=along_path("error in µm", **LOGARITHMIC),
     )
@@ -93,21 +92,14 @@ def _figure_trust(drawn: DrawnPath, bands: Bands) -> Figure:
         told.append(f"{name} {100.0 * count / whole:.0f} %")
         start = np.concatenate((mine[1:], [False])) & ~mine  # a move is drawn from the point before it
         off = gap | ~(mine | start)[order]
-        x, y, z = (gapped(drawn.target[:, k], order, off, 4) for k in range(3))
-        color = STYLES[i][0]
-        traces.append({
-            "type": "scatter3d", "mode": "lines", "name": name, "x": x, "y": y, "z": z, "showlegend": True,
-            "line": {"width": 6, "color": color}, "hovertemplate": f"{name}<br>x %{{x}} y %{{y}} z %{{z}} mm<extra></extra>",
-        })  # fmt: skip
+        traces.append(drawn.in_space(
+            order, off, name=name, showlegend=True, line={"width": 6, "color": STYLES[i][0]},
+            hovertemplate=f"{name}<br>x %{{x}} y %{{y}} z %{{z}} mm<extra></extra>",
+        ))  # fmt: skip
     words = ", ".join(told) or "nothing is cut"
-    return Figure(
-        name="trust",
-        title="Where the correction is trusted",
-        caption="Trusted: all of the correction is taken, and at least 95 % of the machines gain more than it may leave. Doubtful: all "
+    caption = (
+        "Trusted: all of the correction is taken, and at least 95 % of the machines gain more than it may leave. Doubtful: all "
         "of it is taken, and the band exceeds the gain. Shrunk and left alone: what the policy of the machine file made of "
-        f"it. Of the end points: {words}.",
-        label=f"Three-dimensional plot of the tool path by how far the correction is trusted: {words}.",
-        traces=traces,
-        layout={"scene": scene_of(drawn.target[shown]), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
-        height=520,
+        f"it. Of the end points: {words}."
     )
+    return drawn.figure_in_space("trust", "Where the correction is trusted", caption, traces)

@@ -11,7 +11,6 @@ from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.under_control import mode_name
 from camcomp.compensation.program.verify import Verified
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
-from camcomp.ground.records import dataclass
 from camcomp.ground.vectors import largest_of_groups, sizes
 from camcomp.model.job import Job
 from camcomp.report.plot import (
@@ -19,14 +18,17 @@ from camcomp.report.plot import (
     INK,
     SCALE,
     SMALLEST_UM,
-    STYLES,
     Figure,
     Json,
     axis,
+    bars,
     brief,
     broken,
+    enlarged,
     gapped,
+    in_space,
     level,
+    limit_of_bars,
     line,
     micrometres,
     thin,
@@ -41,21 +43,24 @@ TITLES = {
 NO_ERROR_MM = 1e-6  # below it chain errors have no curve of their own
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
 class DrawnPath:
     """Quantities drawn along the path, at the end points (N, ...) of the corrected program."""
 
-    s: Floats  # mm
-    line: Ints
-    hidden: Bools  # moves that are not drawn: rapids and what passes as programmed
-    target: Floats
-    shift: Floats  # (N, 3) um commanded minus programmed tip
-    change: Floats  # (N, m) um or mrad
-    drive: Floats  # (N, m) N or N m
-    before: Floats  # (N,) um, the largest error on the move that ends there; 0 where none counts
-    after: Floats  # (N,) um
-    driven: Floats  # (N,) um the same with what the control merges and rounds
-    mode: str  # of the control
+    def __init__(self, result: Compensated, job: Job) -> None:
+        rows, points = result.rows, result.control.points
+
+        def largest(error: Floats, row: Ints) -> Floats:
+            """The largest error (N,) um on the move that ends there; 0 where none counts."""
+            return largest_of_groups(1e3 * sizes(error), row, len(rows.w))
+
+        self.s, self.line, self.target = result.s, result.lines, rows.target
+        self.hidden = (rows.kind == RAPID) | ~rows.corrected | rows.joining  # rapids and what passes as programmed
+        self.shift = 1e3 * (result.written.end - rows.target)  # (N, 3) um
+        self.change = 1e3 * (result.state.rho - result.nominal)  # (N, m) um or mrad
+        self.drive = result.state.drive * np.where(job.machine.revolute, 1e-3, 1.0)  # (N, m) N or N m
+        self.before, self.after = (largest(each, result.judged) for each in (result.before, result.after))
+        self.driven = largest(result.control.error, points.move)  # with what the controller merges and rounds
+        self.mode = mode_name(result.control.modes)
 
     def worst(self, size: Floats) -> int:
         """Drawn row with the largest `size` (N,)."""
@@ -72,6 +77,16 @@ class DrawnPath:
         """Curves of errors (N, k) um on a logarithmic axis; the last column is what the control drives."""
         return self.curves([*names, f"corrected, as the control drives it in {self.mode}"], values, 6, FLOOR_UM)
 
+    def in_space(self, index: Ints, gap: Bools, **more: Any) -> Json:
+        """The programmed path at rows `index` (k,) as a thick line in space, broken at gaps (k,)."""
+        points = {a: gapped(self.target[:, i], index, gap, 4) for i, a in enumerate(AXES)}
+        return {"type": "scatter3d", "mode": "lines", **points, **more}
+
+    def figure_in_space(self, name: str, title: str, caption: str, traces: Sequence[Json]) -> Figure:
+        """A figure of such lines."""
+        layout = in_space(self.target[~self.hidden], (0.75, -1.0, 0.85))
+        return Figure(name=name, title=title, caption=caption, traces=traces, layout=layout, height=520)
+
 
 def along_path(title: str, **more: Any) -> Json:
     """Layout of a plot along the path, with the title of its vertical axis."""
@@ -79,23 +94,6 @@ def along_path(title: str, **more: Any) -> Json:
 
 
 LOGARITHMIC: Json = {"type": "log", "dtick": 1, "exponentformat": "power"}
-
-
-def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
-    """Everything that is drawn along the path."""
-    rows = result.rows
-
-    def largest(error: Floats, row: Ints) -> Floats:
-        return largest_of_groups(1e3 * sizes(error), row, len(rows.w))
-
-    drive_scale = np.where(job.machine.revolute, 1e-3, 1.0)
-    return DrawnPath(
-        s=result.s, line=result.lines, hidden=(rows.kind == RAPID) | ~rows.corrected | rows.joining,
-        target=rows.target, shift=1e3 * (result.written.end - rows.target),
-        change=1e3 * (result.state.rho - result.nominal), drive=result.state.drive * drive_scale,
-        before=largest(result.before, result.judged), after=largest(result.after, result.judged),
-        driven=largest(result.control.error, result.control.points.move), mode=mode_name(result.control.modes),
-    )  # fmt: skip
 
 
 def figure_trajectories(result: Compensated, curves: Mapping[str, Floats]) -> Figure:
@@ -115,7 +113,6 @@ def figure_trajectories(result: Compensated, curves: Mapping[str, Floats]) -> Fi
     cutting = ~hidden & rows.force.any(axis=1)
     drawn = target[cutting] if cutting.any() else target[~hidden]
     extent = float(np.ptp(drawn, axis=0).max())
-    first = float(np.clip(0.12 * extent / max(1e-3 * max(off), 1e-9), 1.0, 1e4))
     words = ", ".join(f"{name} {micrometres(value)}" for (name, _), value in zip(named[1:], off[1:], strict=True))
     return Figure(
         name="trajectories",
@@ -123,11 +120,10 @@ def figure_trajectories(result: Compensated, curves: Mapping[str, Floats]) -> Fi
         caption="Where the original program takes the tip, for each cause alone and for both where the machine has chain errors, and the "
         "path that is commanded instead. Deviations from the programmed path are enlarged; the slider says how much. "
         f"True largest deviations: {words}.",
-        label=f"Plot of tool tip trajectories with enlarged deviations. Largest true deviations: {words}.",
         traces=traces,
         layout={"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)},
         height=560,
-        exaggerate={"base": base, "shifts": shifts, "planes": _planes(drawn), "first": first, "most": 1e5},
+        exaggerate=enlarged(base, shifts, _planes(drawn), 1e-3 * max(off), extent),
     )
 
 
@@ -154,7 +150,6 @@ def figure_error(drawn: DrawnPath, tolerance_um: float) -> Figure:
         title="Tip error along the path",
         caption=f"Distance of the loaded tip from the programmed tip, on a logarithmic scale: {words}. "
         "At every end point stands the largest error on the move to it.",
-        label=f"Plot of the tip error along the path: {words}.",
         traces=curves,
         layout=along_path("error in µm", **LOGARITHMIC),
     )
@@ -168,7 +163,6 @@ def figure_shift(drawn: DrawnPath) -> Figure:
     return Figure(
         name="shift", title="Shift of the commanded tip",
         caption=f"Commanded minus programmed tip in the program frame: {words}.",
-        label=f"Plot of the shift of the commanded tip in x, y and z along the path: {words}.",
         traces=drawn.curves([f"Δ{a}" for a in AXES], drawn.shift, 3), layout=along_path("shift in µm"),
     )  # fmt: skip
 
@@ -196,7 +190,7 @@ def _actuators(drawn: DrawnPath, names: tuple[str, ...], which: Ints, rotary: bo
     words = f"up to {brief(abs(values[row, column]))} {unit}, actuator {names[which[column]]} in line {drawn.line[row]}"
     return Figure(
         name=f"{'drive' if drive else 'change'}-{'hinges' if rotary else 'slides'}", title=f"{what} along the path",
-        caption=f"{note}: {words}.", label=f"Plot of {what.lower()} along the path, one curve per actuator: {words}.",
+        caption=f"{note}: {words}.",
         traces=drawn.curves([names[a] for a in which], values, 3),
         layout=along_path(f"{'drive' if drive else 'change'} in {unit}"),
     )  # fmt: skip
@@ -206,33 +200,18 @@ def figure_path(drawn: DrawnPath) -> Figure:
     """The tool path in space, coloured by the size of the correction."""
     size = sizes(drawn.shift)
     index, gap = broken(thin(np.column_stack((drawn.target, size))), drawn.hidden)
-    x, y, z = (gapped(drawn.target[:, i], index, gap, 4) for i in range(3))
     bar = {"title": {"text": "correction<br>in µm"}, "thickness": 14, "len": 0.8}
     color = np.where(np.isfinite(size[index]), size[index], 0.0)
-    trace = {
-        "type": "scatter3d", "mode": "lines", "x": x, "y": y, "z": z, "showlegend": False,
-        "line": {"width": 6, "color": np.round(color, 3).tolist(), "colorscale": SCALE, "colorbar": bar, "showscale": True},
-        "hovertemplate": "x %{x} y %{y} z %{z} mm<br>correction %{line.color} µm<extra></extra>",
-    }  # fmt: skip
+    trace = drawn.in_space(
+        index, gap, showlegend=False,
+        line={"width": 6, "color": np.round(color, 3).tolist(), "colorscale": SCALE, "colorbar": bar, "showscale": True},
+        hovertemplate="x %{x} y %{y} z %{z} mm<br>correction %{line.color} µm<extra></extra>",
+    )  # fmt: skip
     low = float(np.nanmin(np.where(drawn.hidden, np.nan, size))) if (~drawn.hidden).any() else 0.0
     words = f"correction from {brief(low)} to {micrometres(size[drawn.worst(size)])}"
-    return Figure(
-        name="path", title="Tool path", caption=f"Feed moves of the program in space, {words}. Drag to turn.",
-        label=f"Three-dimensional plot of the tool path, coloured by the size of the correction: {words}.",
-        traces=[trace],
-        layout={"scene": scene_of(drawn.target[~drawn.hidden]), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
-        height=520,
-    )  # fmt: skip
-
-
-def scene_of(points: Floats) -> dict[str, Any]:
-    """Axes of one scale, a flat path with some room above and below, and an eye that sees all of it."""
-    middle, span = 0.5 * (points.max(axis=0) + points.min(axis=0)), np.ptp(points, axis=0)
-    half = 0.55 * np.maximum(span, 0.2 * max(float(span.max()), 1e-6))
-    ranges = np.column_stack((middle - half, middle + half)).round(6).tolist()
-    axes = {f"{a}axis": axis(f"{a} in mm", range=ranges[i]) for i, a in enumerate(AXES)}
-    ratio = dict(zip(AXES, (half / half.max()).round(6).tolist(), strict=True))
-    return axes | {"aspectmode": "manual", "aspectratio": ratio, "camera": {"eye": {"x": 0.75, "y": -1.0, "z": 0.85}}}
+    return drawn.figure_in_space(
+        "path", "Tool path", f"Feed moves of the program in space, {words}. Drag to turn.", [trace]
+    )
 
 
 def figure_budget(checked: Verified, tolerance_um: float) -> Figure:
@@ -246,14 +225,7 @@ def figure_budget(checked: Verified, tolerance_um: float) -> Figure:
     }
     names = list(worst)[::-1]
     values = [max(worst[name], SMALLEST_UM) for name in names]
-    bars = {
-        "type": "bar", "orientation": "h", "x": values, "y": names, "showlegend": False, "cliponaxis": False,
-        "marker": {"color": STYLES[0][0]}, "text": [micrometres(worst[name]) for name in names], "textposition": "outside",
-    }  # fmt: skip
-    limit = {
-        "type": "scatter", "mode": "lines", "x": [tolerance_um] * 2, "y": [names[0], names[-1]],
-        "name": "tolerance", "line": {"color": STYLES[1][0], "dash": "dot", "width": 2},
-    }  # fmt: skip
+    parts = bars(values, names, [micrometres(worst[name]) for name in names])
     words = ", ".join(f"{name} {micrometres(value)}" for name, value in worst.items())
     top = max(max(values), tolerance_um)
     span = [float(np.log10(min(values))) - 0.3, float(np.log10(top)) + 1.0]
@@ -261,8 +233,7 @@ def figure_budget(checked: Verified, tolerance_um: float) -> Figure:
         name="parts",
         title="Error budget of the corrected program",
         caption=f"Read back from the text of the corrected program, largest value of each part: {words}.",
-        label=f"Bar chart of the parts of the error that is left: {words}.",
-        traces=[bars, limit],
+        traces=[parts, limit_of_bars("tolerance", tolerance_um, names)],
         layout={
             "xaxis": axis("error in µm", type="log", dtick=1, range=span, exponentformat="power"),
             "yaxis": axis(""),

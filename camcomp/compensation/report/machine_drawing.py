@@ -8,17 +8,15 @@ from scipy.optimize import least_squares
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.report.figures import DrawnPath
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.records import dataclass, field
+from camcomp.ground.records import dataclass, field, replace
 from camcomp.model.job import Job
 from camcomp.model.statics.description import Actuator, Chain, Parallelogram, Passive, Robot, Transform
 from camcomp.model.statics.rotation import exp_rotation, rotation_vectors
-from camcomp.report.plot import INK, Figure, Json, axis, micrometres, numbers, thin
+from camcomp.report.plot import INK, Figure, Json, enlarged, in_space, micrometres, numbers, thin
 
 _LENGTH_MM = 300.0  # by which angles are weighed against lengths
 _OPEN_MM = 20.0  # a leg that misses its platform by more was not drawn right and is left out
 _LONGEST = 3.0  # times the size of the machine: a travel that is longer would leave nothing else to see
-TICKS = 7  # along the longest axis
-_SHOWN = 0.1  # of the machine's size: how large the largest deviation is drawn at first
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,26 +39,23 @@ def leg_of(chain: Chain, rho: Floats, rotation: Floats, reference: Floats) -> Dr
     at = chain.frame.T @ reference
 
     def gap(angles: Floats) -> Floats:
-        nodes, turn, _ = _walk(chain, rho, angles)
+        leg, turn = _walk(chain, rho, angles)
         lean: Floats = rotation_vectors((turn @ goal.T)[None])[0]
-        return np.concatenate((nodes[-1] - at, _LENGTH_MM * lean))
+        return np.concatenate((leg.nodes[-1] - at, _LENGTH_MM * lean))
 
     angles = np.array([each.start for each in joints])
     if len(angles):
         angles = least_squares(gap, angles).x
         if np.linalg.norm(gap(angles)) > _OPEN_MM:
             return None
-    nodes, _, bars = _walk(chain, rho, angles)
-    turn, way = chain.frame.T, _way(chain)
-    if way is None:
-        return DrawnLeg(chain.name, nodes @ turn, bars @ turn, None)
-    behind = [k for k, each in enumerate(nodes) if np.linalg.norm(np.cross(each - way[0], way[1] - way[0])) < 1e-6]
-    return DrawnLeg(chain.name, nodes[max(behind) :] @ turn, bars @ turn, way @ turn)  # a leg begins at its carriage
+    leg, to_base = _walk(chain, rho, angles)[0], chain.frame.T
+    way = None if leg.way is None else leg.way @ to_base
+    return replace(leg, nodes=leg.nodes @ to_base, bars=leg.bars @ to_base, way=way)
 
 
-def _walk(chain: Chain, rho: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
-    """Nodes (k, 3), end rotation (3, 3) and bars (b, 2, 3) of a chain in its local axes."""
-    point, turn = np.zeros(3), np.eye(3)
+def _walk(chain: Chain, rho: Floats, angles: Floats) -> tuple[DrawnLeg, Floats]:
+    """A chain and its end rotation (3, 3) in its local axes; behind a slide on the base it begins at its carriage."""
+    point, turn, way, on_base = np.zeros(3), np.eye(3), None, True
     nodes, bars = [point], list[Floats]()
     drives, passive = iter(rho), iter(angles)
     for each in chain.elements:
@@ -72,30 +67,18 @@ def _walk(chain: Chain, rho: Floats, angles: Floats) -> tuple[Floats, Floats, Fl
             if each.revolute:
                 turn = turn @ exp_rotation(value * each.axis)
             else:
-                point = point + value * turn @ each.axis
+                along = turn @ each.axis
+                point = point + value * along
+                if on_base and isinstance(each, Actuator) and np.isfinite(each.limits).all():
+                    way, nodes = start + np.outer(each.limits, along), []
         elif isinstance(each, Parallelogram):
             point = point + turn @ exp_rotation(float(next(passive)) * each.hinge) @ each.arm
             half = 0.5 * each.width * turn @ each.crossbar
             bars += [np.array([start + side * half, point + side * half]) for side in (-1.0, 1.0)]
-        if np.linalg.norm(point - start) > 0.0:
+        on_base = on_base and isinstance(each, Transform)
+        if not nodes or np.linalg.norm(point - start) > 0.0:
             nodes.append(point)
-    return np.array(nodes), turn, np.array(bars).reshape(-1, 2, 3)
-
-
-def _way(chain: Chain) -> Floats | None:
-    """Ends (2, 3) mm of the travel of a slide on the base, local axes; None for other chains."""
-    before: list[Transform] = []
-    for each in chain.elements:
-        if isinstance(each, Transform):
-            before.append(each)
-        elif isinstance(each, Actuator) and not each.revolute and np.isfinite(each.limits).all():
-            ends = [
-                _walk(Chain(chain.name, (*before, each)), np.array([rho]), np.zeros(0))[0][-1] for rho in each.limits
-            ]
-            return np.array(ends)
-        else:
-            return None
-    return None
+    return DrawnLeg(chain.name, np.array(nodes), np.array(bars).reshape(-1, 2, 3), way), turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,32 +143,11 @@ def figure_machine(result: Compensated, job: Job, drawn: DrawnPath) -> Figure | 
         title="The machine where the original program is off most",
         caption=f"Legs, tool and path where the load takes the tip off by {words}. Legs follow the platform; its tilt is not drawn. The "
         "slider says how much deviations are enlarged. Drag to turn.",
-        label=f"Three-dimensional drawing of the machine at the place of the largest error, {words}.",
         traces=lines.traces,
-        layout={
-            "scene": _scene(np.concatenate([path, *(leg.nodes for leg in legs)])),
-            "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
-        },
+        layout=in_space(np.concatenate([path, *(leg.nodes for leg in legs)]), (1.0, -1.65, 0.9)),
         height=560,
-        exaggerate={
-            "base": lines.base,
-            "shifts": lines.shifts,
-            "planes": [],
-            "first": float(np.clip(_SHOWN * size / max(largest, 1e-9), 1.0, 1e5)),
-            "most": 1e6,
-        },
+        exaggerate=enlarged(lines.base, lines.shifts, [], largest, size),
     )
-
-
-def _scene(points: Floats) -> Json:
-    """Axes of one scale around points (n, 3) mm, with margins for the enlarged deflection."""
-    middle, half = 0.5 * (points.max(axis=0) + points.min(axis=0)), 0.5 * np.ptp(points, axis=0)
-    half = half + _SHOWN * 2.0 * half.max()
-    ranges = np.column_stack((middle - half, middle + half)).round(3).tolist()
-    ratio = dict(zip("xyz", (half / half.max()).round(6).tolist(), strict=True))
-    ticks = {a: max(round(TICKS * share), 2) for a, share in ratio.items()}
-    axes = {f"{a}axis": axis(f"{a} in mm", range=ranges[i], nticks=ticks[a]) for i, a in enumerate("xyz")}
-    return axes | {"aspectmode": "manual", "aspectratio": ratio, "camera": {"eye": {"x": 1.0, "y": -1.65, "z": 0.9}}}
 
 
 def _legs(robot: Robot, rho: Floats, rotation: Floats, reference: Floats) -> list[DrawnLeg]:

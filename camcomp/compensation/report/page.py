@@ -15,7 +15,6 @@ from camcomp.compensation.program.verify import Verified, verify
 from camcomp.compensation.report.band_section import band_section
 from camcomp.compensation.report.figures import (
     DrawnPath,
-    drawn_path_of,
     figure_budget,
     figure_error,
     figure_path,
@@ -53,7 +52,7 @@ def compensation_html(result: Compensated, totals: Totals, tolerance_um: float, 
         result.written.data, name=result.program.name, setup=setup_of(job.config), dialect=result.program.dialect
     )
     checked = verify(written, result.program, job)
-    drawn = drawn_path_of(result, job)
+    drawn = DrawnPath(result, job)
     name = PurePath(result.program.name).name
     before, after = figures.before.max_um, figures.after.max_um
     if failed:

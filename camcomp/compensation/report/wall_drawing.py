@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import PurePath
 
 import numpy as np
 
 from camcomp.compensation.program.loaded_cut import loaded_cut, meant_cut, nodes_of
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import ConfigError
 from camcomp.ground.records import dataclass
 from camcomp.model.job import Job
 from camcomp.model.stock.walls import Wall, offsets, walls_of
-from camcomp.report.page import Section
-from camcomp.report.plot import INK, Figure, Json, axis, brief, line, numbers, thin
+from camcomp.report.inputs import Input, inputs_section
+from camcomp.report.page import Page, Section, render
+from camcomp.report.plot import INK, Figure, Json, axis, brief, enlarged, line, numbers, thin
 
 MOST_NODES = 40_000  # a few minutes
 RESTLESS = 0.01  # of all places
-_SHOWN = 0.06  # of the drawing: how large the largest offset is drawn at first
 _WORDS = (
     "Half-way between the floors, from above. The tip is followed as it bends, step by step, and what it leaves standing the next pass "
     "meets. A wall is off by its distance square to the wall that was meant: above zero material is left, below zero too "
@@ -62,62 +64,38 @@ def wall_section(job: Job, meant: Program, programs: Sequence[tuple[str, Program
         text.append(
             f"At {100.0 * found.restless:.0f} % of the places force and tip do not come to rest: walls are rough there."
         )
-    return Section(name="walls", title="Walls", text=text, figures=[figure_walls(found), figure_along(found)])
+    return Section(name="walls", title="Walls", text=text, figures=_figures(found))
 
 
-def figure_walls(found: CutWalls) -> Figure:
-    """All walls from above; a slider enlarges by how much they are off."""
-    rows = _rows(found)
-    base = {a: _joined([w.points[r, i] for w, r in zip(found.walls, rows, strict=True)]) for i, a in enumerate("xy")}
-    heights = _joined([np.full(len(r), w.level) for w, r in zip(found.walls, rows, strict=True)], 3)
+def _figures(found: CutWalls) -> list[Figure]:
+    """All walls from above, where a slider enlarges by how much they are off, and that along them, one behind the other."""
+    points, inward, way, level, off = np.split(_drawn(found), [2, 4, 5, 6], axis=1)
     traces: list[Json] = [line("as meant", [], [], 0, hoverinfo="skip")]
     traces[0]["line"] = {"color": INK, "dash": "solid", "width": 1.5}
-    shifts: list[Json] = [{}]
-    for k, (name, off) in enumerate(zip(found.names, found.off, strict=True)):
-        ways = [-1e-3 * off[i][r, None] * w.inward[r] for i, (w, r) in enumerate(zip(found.walls, rows, strict=True))]
-        traces.append(
-            line(name, [], [], k, customdata=_pairs([off[i][r] for i, r in enumerate(rows)], heights),
-                 hovertemplate="off by %{customdata[0]} µm<br>at Z %{customdata[1]}")
-        )  # fmt: skip
-        shifts.append({a: _joined([way[:, i] for way in ways], 6) for i, a in enumerate("xy")})
-    corners = np.concatenate([w.points for w in found.walls])
-    extent, largest = float(np.ptp(corners, axis=0).max()), max(_largest(off) for off in found.off)
+    shifts, curves, height = [dict[str, list[float | None]]()], [], numbers(level[:, 0], 3)
+    for k, name in enumerate(found.names):
+        told = [list(each) for each in zip(numbers(off[:, k], 1), height, strict=True)]
+        hover = "off by %{customdata[0]} µm<br>at Z %{customdata[1]}"
+        traces.append(line(name, [], [], k, customdata=told, hovertemplate=hover))
+        shift = -1e-3 * off[:, k, None] * inward
+        shifts.append({a: numbers(shift[:, i], 6) for i, a in enumerate("xy")})
+        curves.append(line(name, numbers(way[:, 0], 3), numbers(off[:, k], 2), k))
+    corners = np.concatenate([wall.points for wall in found.walls])
+    largest = max(float(np.nanmax(np.abs(np.concatenate(each)), initial=0.0)) for each in found.off)
+    base, extent = {a: numbers(points[:, i], 4) for i, a in enumerate("xy")}, float(np.ptp(corners, axis=0).max())
     words = walls_summary(found)
-    return Figure(
-        name="walls-above",
-        title="Walls from above",
+    above = Figure(
+        name="walls-above", title="Walls from above",
         caption=f"Walls as meant, and as the bent tool leaves them, enlarged; the slider says how much. Off {words}.",
-        label=f"Drawing of the walls from above with enlarged deviations: {words}.",
-        traces=traces,
-        layout={"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)},
-        height=560,
-        exaggerate={
-            "base": base, "shifts": shifts, "planes": ["xy"],
-            "first": float(np.clip(_SHOWN * extent / max(1e-3 * largest, 1e-9), 1.0, 1e4)), "most": 1e5,
-        },
+        traces=traces, layout={"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)}, height=560,
+        exaggerate=enlarged(base, shifts, ["xy"], 1e-3 * largest, extent),
     )  # fmt: skip
-
-
-def figure_along(found: CutWalls) -> Figure:
-    """By how much walls are off, along them, one wall behind the other."""
-    rows, begin, way = _rows(found), 0.0, []
-    for wall, r in zip(found.walls, rows, strict=True):
-        way.append(begin + wall.length[r])
-        begin += float(wall.length[-1])
-    x = _joined(way, 3)
-    curves = [
-        line(name, x, _joined([off[i][r] for i, r in enumerate(rows)], 2), k)
-        for k, (name, off) in enumerate(zip(found.names, found.off, strict=True))
-    ]
-    words = walls_summary(found)
-    return Figure(
-        name="walls-along",
-        title="Along the walls",
+    along = Figure(
+        name="walls-along", title="Along the walls",
         caption=f"By how much the walls are off, one behind the other: {words}.",
-        label=f"Plot of the offset of the walls along their way: {words}.",
-        traces=curves,
-        layout={"xaxis": axis("way along the walls in mm"), "yaxis": axis("material left in µm")},
-    )
+        traces=curves, layout={"xaxis": axis("way along the walls in mm"), "yaxis": axis("material left in µm")},
+    )  # fmt: skip
+    return [above, along]
 
 
 def walls_summary(found: CutWalls) -> str:
@@ -134,23 +112,42 @@ def walls_summary(found: CutWalls) -> str:
     return "; ".join(parts)
 
 
-def _largest(off: list[Floats]) -> float:
-    return float(np.nanmax(np.abs(np.concatenate(off)), initial=0.0))
+def _drawn(found: CutWalls) -> Floats:
+    """Drawn points of all walls, one behind the other, with a row of NaN between two.
+
+    Columns: x, y, both components of the normal, way along the walls, height, and by how much each program is off.
+    """
+    most, begin, parts = max(4000 // max(len(found.walls), 1), 50), 0.0, list[Floats]()
+    for i, wall in enumerate(found.walls):
+        off = np.column_stack([each[i] for each in found.off])
+        level = np.full(len(off), wall.level)
+        columns = np.column_stack((wall.points, wall.inward, begin + wall.length, level, off))
+        parts += [columns[thin(np.column_stack((wall.points, off)), most)], np.full((1, columns.shape[1]), np.nan)]
+        begin += float(wall.length[-1])
+    return np.concatenate(parts[:-1])
 
 
-def _rows(found: CutWalls) -> list[np.ndarray]:
-    """Points of every wall that are drawn."""
-    most = max(4000 // max(len(found.walls), 1), 50)
-    return [thin(np.column_stack((w.points, *(off[i] for off in found.off))), most) for i, w in enumerate(found.walls)]
+def walls_html(job: Job, program: Program, inputs: Sequence[Input]) -> bytes:
+    """The page of a simulated cut: the walls that the bent tool leaves.
 
-
-def _joined(parts: list[Floats], decimals: int = 4) -> list[float | None]:
-    """Curves one behind the other with gaps between them."""
-    out: list[float | None] = []
-    for part in parts:
-        out += [*numbers(part, decimals), None]
-    return out[:-1]
-
-
-def _pairs(off: list[Floats], height: list[float | None]) -> list[list[float | None]]:
-    return [[a, b] for a, b in zip(_joined(off, 1), height, strict=True)]
+    Raises ConfigError CC298 without a stock, CC216 when the plot library is not installed.
+    """
+    if job.config.workpiece.stock is None:
+        message = "there is no stock that could be cut"
+        raise ConfigError("CC298", message, at=job.config.at("workpiece"), hint="add workpiece: stock")
+    section = wall_section(job, program, [("as written", program)])
+    drawn = section is not None and bool(section.figures)
+    lines = int(np.unique(program.path.line).size)
+    verdict = "No wall is left that could be drawn."
+    if drawn:
+        verdict = "Walls as the loaded machine leaves them; how far they are off stands below the drawings."
+    page = Page(
+        title=f"{PurePath(program.name).name} on {job.config.robot.name}",
+        subtitle=f"Simulated cut: what the loaded machine leaves of the stock, {lines} lines with motions",
+        verdict=verdict,
+        good=drawn,
+        cards=[],
+        sections=[section or Section(name="walls", title="Walls", text=[verdict]), inputs_section(inputs)],
+        word="Cut" if drawn else "",
+    )
+    return render(page)

@@ -18,8 +18,10 @@ from camcomp.report.plot import (
     Figure,
     Json,
     axis,
+    bars,
     brief,
     level,
+    limit_of_bars,
     line,
     numbers,
     thin,
@@ -30,12 +32,8 @@ def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
     """The gap on withheld runs with one cause after the other added to the model; floor: noise floor, um, or None."""
     names = ["as it was", *(f"+ {step.label}" for step in shrink.steps)]
     values = [shrink.before_rms_um, *(step.after_rms_um for step in shrink.steps)]
-    bars = _bars(values[::-1], names[::-1], [f"{brief(v)} µm" for v in values[::-1]])
-    style = {"color": STYLES[1][0], "dash": "dot", "width": 2}
-    noise: Json = {
-        "type": "scatter", "mode": "lines", "x": [floor, floor], "y": [names[-1], names[0]], "name": "noise floor",
-        "line": style,
-    }  # fmt: skip
+    steps = bars(values[::-1], names[::-1], [f"{brief(v)} µm" for v in values[::-1]])
+    noise = limit_of_bars("noise floor", floor, names[::-1])
     words = ", ".join(f"{name} {brief(value)} µm" for name, value in zip(names, values, strict=True))
     known = "not known" if floor is None else f"{brief(floor)} µm"
     return Figure(
@@ -43,7 +41,7 @@ def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
         title="Shrinkage ladder",
         caption=f"Root mean square of the gap on runs that the fit has not seen, with one cause after the other put into the "
         f"model: {words}. Noise floor {known}.",
-        traces=[bars] if floor is None else [bars, noise],
+        traces=[steps] if floor is None else [steps, noise],
         layout={
             "xaxis": axis("gap in µm (rms)", range=[0.0, 1.15 * max(*values, floor or 0.0)]),
             "yaxis": axis(""),
@@ -51,14 +49,6 @@ def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
         },
         height=150 + 42 * len(names),
     )
-
-
-def _bars(values: Sequence[float], names: Sequence[str], texts: Sequence[str]) -> Json:
-    """Horizontal bars with a text behind each."""
-    return {
-        "type": "bar", "orientation": "h", "x": list(values), "y": list(names), "text": list(texts), "textposition": "outside",
-        "marker": {"color": STYLES[0][0]}, "cliponaxis": False, "showlegend": False,
-    }  # fmt: skip
 
 
 def figure_signed(view: RunView, number: int) -> Figure:
@@ -155,7 +145,7 @@ def figure_shares(where: Where) -> Figure | None:
     rows = [(f"{kind} {name}", share) for kind, part in groups for name, share in part.items()][::-1]
     if not any(share for _, share in rows):
         return None
-    bars = _bars(
+    parts = bars(
         [100.0 * share for _, share in rows], [name for name, _ in rows], [percent(share) for _, share in rows]
     )
     words = ", ".join(f"{name} {100 * share:.0f} %" for name, share in rows[::-1] if share)
@@ -164,7 +154,7 @@ def figure_shares(where: Where) -> Figure | None:
         title="By axis and actuator, and what it depends on",
         caption="Share of the gap's energy above the noise by axis of the workpiece and, read as motion of the carriages, by "
         f"actuator; below, how much of the gap follows each quantity: {words}. These may overlap.",
-        traces=[bars],
+        traces=[parts],
         layout={"xaxis": axis("share in %", range=[0, 115]), "yaxis": axis(""), "margin": BAR_MARGIN},
         height=120 + 26 * len(rows),
     )
