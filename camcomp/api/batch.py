@@ -14,14 +14,13 @@ from camcomp.compensation.batch.programs import (
     DONE,
     ERROR,
     FoundProgram,
-    Plan,
     Status,
     find_programs,
     output_tree,
     run_batch,
     summary,
 )
-from camcomp.compensation.batch.worker import Outcome, Task
+from camcomp.compensation.batch.worker import Outcome, Plan, Task
 from camcomp.ground.errors import CamcompError, CheckFailed
 from camcomp.ground.files import write_all
 from camcomp.ground.shelf import usable

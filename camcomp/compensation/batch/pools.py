@@ -1,7 +1,7 @@
 """Worker processes for a batch: those of this machine, or a Dask cluster that is already running.
 
 Both give outcomes as they come, each task once. A worker that dies takes its task with it; the task is given to another,
-and only a task that brings down worker after worker is given up.
+and is given up if that dies, too.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import multiprocessing
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
+from functools import partial
 from itertools import islice
-from queue import Empty, Queue
 from types import ModuleType
 from typing import Any
 
@@ -28,9 +28,8 @@ from camcomp.ground.machine_code import ROOT
 from camcomp.ground.notes import note
 
 DIED = "the worker process died, perhaps for lack of memory"
-DEATHS = 3  # workers that a task may bring down before it is given up
 CONNECT = 10.0  # s within which a scheduler has to answer
-LOOK = 1.0  # s between two looks at a cluster in which nothing happens
+LOOK = 1.0  # s between two looks at workers from which nothing comes
 PATIENCE = 5.0  # s without a worker before a word is said about it
 FORKS = sys.platform != "win32"
 NEEDED = ("camcomp.compensation.batch.worker", "camcomp.compensation.long.program", "camcomp.model.from_program")
@@ -77,19 +76,17 @@ def on_this_machine(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
         yield from map(work, tasks)
         return
     start_early()
-    source = iter(tasks)
-    open_tasks: dict[str, Task] = {}
-    for _ in range(DEATHS):
+    source, open_tasks, ended = iter(tasks), dict[str, Task](), False
+    while not ended:
         with suppress(BrokenProcessPool):
-            yield from _on_workers(iter(list(open_tasks.values())), open_tasks, jobs)
             yield from _on_workers(source, open_tasks, jobs)
-            return
-    for task in [*open_tasks.values(), *source]:  # one by one: now it shows which task brings workers down
-        try:
-            yield from _on_workers(iter([task]), open_tasks, 1)
-        except BrokenProcessPool:
-            open_tasks.pop(task.key)
-            yield failed(task.key, BUG, DIED, where="internal error: ")
+            ended = True
+        for task in list(open_tasks.values()):  # one by one: so it shows which of them brings workers down
+            try:
+                yield from _on_workers(iter([task]), open_tasks, 1)
+            except BrokenProcessPool:
+                del open_tasks[task.key]
+                yield failed(task.key, BUG, DIED, where="internal error: ")
 
 
 def _on_workers(tasks: Iterator[Task], open_tasks: dict[str, Task], jobs: int) -> Iterator[Outcome]:
@@ -97,31 +94,42 @@ def _on_workers(tasks: Iterator[Task], open_tasks: dict[str, Task], jobs: int) -
     pool = ProcessPoolExecutor(
         jobs, multiprocessing.get_context("forkserver" if FORKS else "spawn"), initializer=live_with_parent
     )
-    others, waiting = set(multiprocessing.active_children()), set[Future[Outcome]]()
+    others = set(multiprocessing.active_children())
 
-    def submit(count: int) -> None:
-        for task in islice(tasks, count):
-            open_tasks[task.key] = task
-            with clean_children():
-                waiting.add(pool.submit(work, task))
+    def submit(task: Task) -> Future[Outcome]:
+        open_tasks[task.key] = task
+        with clean_children():
+            return pool.submit(work, task)
 
     try:
-        submit(2 * jobs)
-        while waiting:
-            for each in wait(waiting, return_when=FIRST_COMPLETED).done:
-                waiting.remove(each)
-                outcome = each.result()
-                submit(1)
-                open_tasks.pop(outcome.key)
-                for topic, text in outcome.notes.items():
-                    note(topic, text)
-                yield outcome
+        for outcome in _outcomes(tasks, submit, 2 * jobs):
+            del open_tasks[outcome.key]
+            yield outcome
     except BaseException:
         for process in set(multiprocessing.active_children()) - others:
             process.kill()
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _outcomes(
+    tasks: Iterator[Task], submit: Callable[[Task], Future[Outcome]], count: int, *,
+    outcome_of: Callable[[Future[Outcome], str], Outcome] = lambda future, _key: future.result(),
+    look: Callable[[], object] = lambda: None,
+) -> Iterator[Outcome]:  # fmt: skip
+    """Outcomes as they come, with `count` tasks submitted at once; look: called where none has come for LOOK seconds."""
+    waiting = {submit(task): task.key for task in islice(tasks, count)}
+    while waiting:
+        found = wait(waiting, timeout=LOOK, return_when=FIRST_COMPLETED).done
+        if not found:
+            look()
+        for future in found:
+            outcome = outcome_of(future, waiting.pop(future))
+            waiting |= {submit(task): task.key for task in islice(tasks, 1)}
+            for topic, text in outcome.notes.items():
+                note(topic, text)
+            yield outcome
 
 
 def on_a_cluster(tasks: Iterable[Task], address: str, tell: Callable[[str], None] = print) -> Iterator[Outcome]:
@@ -143,8 +151,10 @@ def on_a_cluster(tasks: Iterable[Task], address: str, tell: Callable[[str], None
         client = Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise FileError("CC503", f"no Dask scheduler answers at {address}: {error}") from error
+    cluster, submit = _Cluster(client, address, tell), partial(client.get_executor(pure=True, retries=0).submit, work)
     try:
-        yield from _Cluster(client, address, tell).outcomes(iter(tasks))
+        count = 4 * max(1, cluster.look())
+        yield from _outcomes(iter(tasks), submit, count, outcome_of=cluster.outcome, look=cluster.look)
     finally:
         with suppress(Exception):  # the scheduler may be gone
             client.close(timeout=2)
@@ -155,87 +165,50 @@ class _Cluster:
 
     def __init__(self, client: Any, address: str, tell: Callable[[str], None]) -> None:
         self._client, self._address, self._tell = client, address, tell
-        self._done: Queue[Any] = Queue()
-        self._open: dict[Any, str] = {}
         self._fitting: set[str] = set()
         self._alone_since: float | None = time.monotonic()
-        self._told = False
 
-    def outcomes(self, tasks: Iterator[Task]) -> Iterator[Outcome]:
-        """Each task's outcome, as it comes."""
-        self._submit(tasks, 4 * max(1, len(self._workers())))
-        while self._open:
-            try:
-                future = self._done.get(timeout=LOOK)
-            except Empty:
-                self._workers()
-                continue
-            outcome = self._outcome(future, self._open.pop(future))
-            future.release()
-            self._submit(tasks, 1)
-            yield outcome
-
-    def _submit(self, tasks: Iterator[Task], count: int) -> None:
-        for task in islice(tasks, count):
-            future = self._client.submit(work, task, key=f"camcomp-{task.key}", pure=True, retries=0)
-            self._open[future] = task.key
-            future.add_done_callback(self._done.put)
-
-    def _outcome(self, future: Any, key: str) -> Outcome:
+    def outcome(self, future: Future[Outcome], key: str) -> Outcome:
+        """The outcome of a task that has ended. Raises FileError."""
         from distributed.scheduler import KilledWorker
 
         try:
-            outcome: Outcome = future.result(timeout=LOOK)
+            outcome = future.result()
         except KilledWorker:
             return failed(key, BUG, DIED, where="internal error: ")
-        except (
-            CancelledError,
-            asyncio.CancelledError,
-            OSError,
-        ) as error:  # only the scheduler cancels, when it goes away
+        except (CancelledError, asyncio.CancelledError, OSError) as error:  # only a scheduler that goes away cancels
             raise self._gone() from error
         except Exception as error:  # noqa: BLE001 - the cluster's, not the task's: `work` never raises
-            self._workers()
+            self.look()
             text = f"the cluster did not do it: {type(error).__name__}: {error}"
             return failed(key, FileError.exit_code, text, rule="CC503")
-        if outcome.version != __version__:
-            self._refuse("a worker", outcome.version)
+        self._check_version("a worker", outcome.version)
         return outcome
 
-    def _workers(self) -> list[str]:
-        """Addresses of the workers that there are. Says after PATIENCE that there is none. Raises FileError."""
+    def look(self) -> int:
+        """How many workers there are. Says once after PATIENCE that there is none. Raises FileError."""
         if self._client.status != "running":
             raise self._gone()
-        workers = list(self._client.scheduler_info(n_workers=-1)["workers"])
-        self._check_versions([each for each in workers if each not in self._fitting])
+        workers = set(self._client.scheduler_info(n_workers=-1)["workers"])
+        if new := list(workers - self._fitting):
+            with suppress(OSError, CancelledError, asyncio.CancelledError):  # gone meanwhile; the next look tells
+                # A function of camcomp's own would have to be known to whatever version is there.
+                ask = "__import__('camcomp').__version__"
+                for worker, version in self._client.run(eval, ask, workers=new, on_error="return").items():
+                    if not isinstance(version, OSError):
+                        self._check_version(worker, version)
+                        self._fitting.add(worker)
         if workers:
-            self._alone_since, self._told = None, False
-        elif self._alone_since is None:
             self._alone_since = time.monotonic()
-        elif time.monotonic() - self._alone_since > PATIENCE and not self._told:
+        elif self._alone_since is not None and time.monotonic() - self._alone_since > PATIENCE:
             self._tell(f"the Dask scheduler at {self._address} has no workers; waiting for one")
-            self._told = True
-        return workers
+            self._alone_since = None
+        return len(workers)
 
     def _gone(self) -> FileError:
         return FileError("CC503", f"the Dask scheduler at {self._address} went away")
 
-    def _check_versions(self, workers: Sequence[str]) -> None:
-        if not workers:
-            return
-        # A function of camcomp's own would have to be known to whatever version is there.
-        ask = "__import__('camcomp').__version__"
-        try:
-            found = self._client.run(eval, ask, workers=list(workers), on_error="return")
-        except (OSError, CancelledError, asyncio.CancelledError):
-            return  # gone meanwhile; the next look tells
-        for worker, version in found.items():
-            if isinstance(version, OSError):
-                continue
-            if version != __version__:
-                self._refuse(worker, version)
-            self._fitting.add(worker)
-
-    def _refuse(self, worker: str, version: object) -> None:
-        have = f"camcomp {version}" if isinstance(version, str) else f"no camcomp that can be used ({version})"
-        raise FileError("CC505", f"{worker} has {have}, this is {__version__}")
+    def _check_version(self, worker: str, version: object) -> None:
+        if version != __version__:
+            have = f"camcomp {version}" if isinstance(version, str) else f"no camcomp that can be used ({version})"
+            raise FileError("CC505", f"{worker} has {have}, this is {__version__}")

@@ -7,20 +7,18 @@ import hashlib
 import json
 import os
 import pickle
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from camcomp.compensation.batch.worker import Outcome, Task, messages_of
+from camcomp.compensation.batch.worker import Outcome, Plan, Task, messages_of
 from camcomp.gcode.detect import endings
 from camcomp.ground.errors import CamcompError, ConfigError, FileError
 from camcomp.ground.files import alone_in, display_name, read_bytes, write_all
 from camcomp.ground.places import one_place_each
 from camcomp.ground.records import dataclass, field
-from camcomp.model.config.spec import Config
 from camcomp.model.config.yaml_tree import leaves, plain
-from camcomp.model.from_program import StockChoice
 
 SUFFIXES = (".nc", ".ngc", ".ncc", ".tap", ".gcode", ".cnc", ".eia", ".min", ".iso")  # of several dialects
 STATE = ".camcomp"  # folder beside the outputs: what each was made from
@@ -86,36 +84,27 @@ def _first_magic(path: Path) -> int:
     return next(i for i, part in enumerate(path.parts) if glob.has_magic(part))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Plan:
-    """Settings that all programs of a batch share."""
+def key_of_config(plan: Plan) -> str:
+    """Hash of the configuration, of the tables that it names, and of the options: by content, whatever the names."""
+    config = plan.config
+    options = (
+        plan.version, plan.method, plan.tolerance_um, plan.joints, plan.stock, plan.passes, config.control.dialect,
+    )  # fmt: skip
+    digest = hashlib.sha256(repr(options).encode())
+    assert config._tree is not None  # every loaded config has one
+    for name, node in sorted(leaves(config._tree), key=lambda each: each[0]):
+        value = plain(node)
+        key = name.rpartition(".")[2]
+        if (key == "file" or key.endswith("_file")) and isinstance(value, str):
+            value = _hash(read_bytes(Path(node.at.file).parent / value))
+        digest.update(repr((name, value)).encode())
+    if config.spreads:
+        digest.update(repr([(each.name, each.sd, each.group) for each in config.spreads]).encode())
+    return digest.hexdigest()
 
-    config: Config
-    output: Path
-    method: str
-    tolerance_um: float
-    joints: bool
-    version: str
-    stock: StockChoice | None = None
-    passes: bool = False  # programs that were compensated before go through unchanged
 
-    def key_of_config(self) -> str:
-        """Hash of the configuration, of the tables that it names, and of the options: by content, whatever the names."""
-        options = (
-            self.version, self.method, self.tolerance_um, self.joints, self.stock, self.passes,
-            self.config.control.dialect,
-        )  # fmt: skip
-        digest = hashlib.sha256(repr(options).encode())
-        assert self.config._tree is not None  # every loaded config has one
-        for name, node in sorted(leaves(self.config._tree), key=lambda each: each[0]):
-            value = plain(node)
-            key = name.rpartition(".")[2]
-            if (key == "file" or key.endswith("_file")) and isinstance(value, str):
-                value = hashlib.sha256(read_bytes(Path(node.at.file).parent / value)).hexdigest()
-            digest.update(repr((name, value)).encode())
-        if self.config.spreads:
-            digest.update(repr([(each.name, each.sd, each.group) for each in self.config.spreads]).encode())
-        return digest.hexdigest()
+def _hash(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
 
 
 @contextmanager
@@ -140,7 +129,7 @@ def run_batch(
 
     What ends the pool (FileError, a signal) comes through, after the status of all that is known by then.
     """
-    config_key, config = plan.key_of_config(), pickle.dumps(plan.config)
+    config_key, pickled = key_of_config(plan), pickle.dumps(plan)
     pending: dict[str, FoundProgram] = {}
     early: list[Status] = []
 
@@ -157,10 +146,7 @@ def run_batch(
                 early.append(known)
                 continue
             pending[key] = each
-            yield Task(
-                name=display_name(each.source), key=key, data=data, config=config, method=plan.method,
-                tolerance_um=plan.tolerance_um, joints=plan.joints, stock=plan.stock, passes=plan.passes,
-            )  # fmt: skip
+            yield Task(name=display_name(each.source), key=key, data=data, plan=pickled)
 
     try:
         for outcome in pool(tasks()):
@@ -188,35 +174,28 @@ def _note(plan: Plan, found: FoundProgram) -> Path:
 
 def _known(plan: Plan, found: FoundProgram, key: str) -> Status | None:
     """The status of an earlier run, when the outputs are still what that run made of the same inputs."""
+    targets = _targets(plan, found)
     try:
         note = json.loads(_note(plan, found).read_bytes())
         if note["key"] != key:
             return None
-        for name, target in _targets(plan, found).items():
-            if hashlib.sha256(target.read_bytes()).hexdigest() != note["outputs"][name]:
-                return None
+        if any(_hash(target.read_bytes()) != note["outputs"][name] for name, target in targets.items()):
+            return None
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return Status(
-        source=str(found.source), output=str(plan.output / found.relative), status=SKIPPED,
-        exit_code=note["exit_code"], figures=note["figures"], messages=note["messages"],
-    )  # fmt: skip
+    return _status(found, SKIPPED, note, targets["program"])
 
 
 def _keep(plan: Plan, found: FoundProgram, outcome: Outcome) -> Status:
     """Write the outputs of a program and their hashes."""
-    made = {"program": outcome.program, "joints": outcome.joints}
     if outcome.program is None:
-        return Status(
-            source=str(found.source), output=None, status=ERROR, exit_code=outcome.exit_code, figures=outcome.figures,
-            messages=outcome.messages,
-        )  # fmt: skip
-    targets = _targets(plan, found)
+        return _status(found, ERROR, vars(outcome))
+    made, targets = {"program": outcome.program, "joints": outcome.joints}, _targets(plan, found)
     contents = {target: made[name] or b"" for name, target in targets.items()}
     note = {
         "key": outcome.key,
         "exit_code": outcome.exit_code,
-        "outputs": {name: hashlib.sha256(contents[target]).hexdigest() for name, target in targets.items()},
+        "outputs": {name: _hash(contents[target]) for name, target in targets.items()},
         "figures": outcome.figures,
         "messages": outcome.messages,
     }
@@ -229,17 +208,18 @@ def _keep(plan: Plan, found: FoundProgram, outcome: Outcome) -> Status:
         return _refused(found, FileError("CC501", f"cannot write {error.filename}: {error.strerror}"))
     except CamcompError as error:
         return _refused(found, error)
-    status = FAILED_CHECK if outcome.exit_code else DONE
-    return Status(
-        source=str(found.source), output=str(targets["program"]), status=status, exit_code=outcome.exit_code,
-        figures=outcome.figures, messages=outcome.messages,
-    )  # fmt: skip
+    return _status(found, FAILED_CHECK if outcome.exit_code else DONE, vars(outcome), targets["program"])
 
 
 def _refused(found: FoundProgram, error: CamcompError) -> Status:
-    return Status(
-        source=str(found.source), output=None, status=ERROR, exit_code=error.exit_code, messages=messages_of(error)
-    )
+    result = {"exit_code": error.exit_code, "figures": {}, "messages": messages_of(error)}
+    return _status(found, ERROR, result)
+
+
+def _status(found: FoundProgram, status: str, result: Mapping[str, Any], output: Path | None = None) -> Status:
+    """A status with exit code, figures and messages of a result."""
+    told = {name: result[name] for name in ("exit_code", "figures", "messages")}
+    return Status(source=str(found.source), output=None if output is None else str(output), status=status, **told)
 
 
 def summary(statuses: Sequence[Status], programs: Sequence[FoundProgram] = (), stopped: int = 0) -> dict[str, Any]:

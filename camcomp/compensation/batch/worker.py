@@ -21,6 +21,9 @@ from camcomp.ground.progress import watched
 from camcomp.ground.records import dataclass, field
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from camcomp.model.config.spec import Config
     from camcomp.model.from_program import StockChoice
     from camcomp.model.job import Job
 
@@ -36,12 +39,21 @@ class Task:
     name: str  # for messages
     key: str  # hash of all that decides the result
     data: bytes
-    config: bytes  # pickled once for all tasks
+    plan: bytes  # pickled once for all tasks
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Settings that all programs of a batch share."""
+
+    config: Config
+    output: Path
     method: str
     tolerance_um: float
     joints: bool
+    version: str
     stock: StockChoice | None = None
-    passes: bool = False  # a program that was compensated before goes through unchanged
+    passes: bool = False  # programs that were compensated before go through unchanged
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,16 +121,17 @@ def _compensate(task: Task) -> Outcome:
     from camcomp.gcode.stamp import is_stamped
     from camcomp.model.from_program import job_of_program
 
-    if task.passes and is_stamped(task.data):
+    plan, job = _opened(task.plan)
+    if plan.passes and is_stamped(task.data):
         return Outcome(key=task.key, exit_code=0, program=task.data)
-    settings = CorrectionSettings(method=task.method, tolerance_um=task.tolerance_um, version=__version__)
-    job = job_of_program(_job(task.config), task.data, task.name, task.stock)
-    program, joints = BytesIO(), BytesIO() if task.joints else None
+    settings = CorrectionSettings(method=plan.method, tolerance_um=plan.tolerance_um, version=plan.version)
+    job = job_of_program(job, task.data, task.name, plan.stock)
+    program, joints = BytesIO(), BytesIO() if plan.joints else None
     outputs = OpenOutputs(program=program, joints=joints, table=TABLE)
     totals = compensate_into(BytesIO(task.data), task.name, job, settings, outputs)
     checks = [
         {"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"}
-        for rule, text in totals.failed_checks(task.tolerance_um)
+        for rule, text in totals.failed_checks(plan.tolerance_um)
     ]
     return Outcome(
         key=task.key, exit_code=int(bool(checks)), messages=checks, program=program.getvalue(),
@@ -127,7 +140,8 @@ def _compensate(task: Task) -> Outcome:
 
 
 @lru_cache(maxsize=2)
-def _job(config: bytes) -> Job:
+def _opened(plan: bytes) -> tuple[Plan, Job]:
     from camcomp.model.job import Job
 
-    return Job(pickle.loads(config))
+    found: Plan = pickle.loads(plan)
+    return found, Job(found.config)

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from camcomp.compensation.batch import pools
-from camcomp.compensation.batch.worker import Task
+from camcomp.compensation.batch.worker import Plan, Task
 from camcomp.ground.errors import FileError
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
@@ -25,17 +25,14 @@ GOOD = "G21 G90 G94\nG0 X0 Y0 Z5\nG1 Z0 F100\nX{x}\nM30\n"
 
 
 def tasks(count, text=GOOD):
-    config = pickle.dumps(load_config([shipped("config/cartesian.yaml")]))
-    for i in range(count):
-        yield Task(
-            name=f"{i}.nc",
-            key=f"key-{i}",
-            data=text.format(x=i + 1).encode(),
-            config=config,
-            method="newton",
-            tolerance_um=1.0,
-            joints=False,
+    plan = pickle.dumps(
+        Plan(
+            config=load_config([shipped("config/cartesian.yaml")]), output=Path("out"), method="newton", tolerance_um=1.0,
+            joints=False, version="1",
         )
+    )  # fmt: skip
+    for i in range(count):
+        yield Task(name=f"{i}.nc", key=f"key-{i}", data=text.format(x=i + 1).encode(), plan=plan)
 
 
 def deadly(task, mark, always):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from camcomp import __version__
 from camcomp.api.compensation import compensate_file
 from camcomp.compensation.batch import programs
 from camcomp.compensation.batch.worker import Outcome, Task, work
@@ -175,7 +176,7 @@ def test_changed_configuration_is_noticed_by_its_content(tmp_path):
         plan = programs.Plan(
             config=load_config([machine]), output=tmp_path, method="newton", tolerance_um=1.0, joints=False, version="1"
         )
-        keys.add(plan.key_of_config())
+        keys.add(programs.key_of_config(plan))
     assert len(keys) == 2
 
 
@@ -188,9 +189,16 @@ def test_configuration_on_standard_input_counts_by_its_content(tmp_path, monkeyp
     ):
         monkeypatch.setattr("sys.stdin", TextIOWrapper(BytesIO(text.encode())))
         keys.append(
-            programs.Plan(
-                config=load_config(["-"]), output=tmp_path, method="newton", tolerance_um=1.0, joints=False, version="1"
-            ).key_of_config()
+            programs.key_of_config(
+                programs.Plan(
+                    config=load_config(["-"]),
+                    output=tmp_path,
+                    method="newton",
+                    tolerance_um=1.0,
+                    joints=False,
+                    version="1",
+                )
+            )
         )
     assert keys[0] == keys[1] != keys[2]
 
@@ -203,9 +211,11 @@ def test_a_changed_table_is_noticed_wherever_the_configuration_names_it(tmp_path
         table.write_text(f"feed_mm_min,fr_N,ft_N,fz_N\n100,{force},0,0\n200,{force},0,0\n")
         config = load_config([MACHINE, machine])
         keys.add(
-            programs.Plan(
-                config=config, output=tmp_path, method="newton", tolerance_um=1.0, joints=False, version="1"
-            ).key_of_config()
+            programs.key_of_config(
+                programs.Plan(
+                    config=config, output=tmp_path, method="newton", tolerance_um=1.0, joints=False, version="1"
+                )
+            )
         )
     assert len(keys) == 2
 
@@ -252,16 +262,16 @@ def test_outputs_that_are_one_file_through_links_are_refused(bench, tmp_path):
 # --- one program ------------------------------------------------------------------------------------------------------
 
 
-def task(text, **more):
-    given = {"joints": False, "tolerance_um": 1.0, **more}
-    return Task(
-        name="p.nc",
-        key="key",
-        data=text.encode(),
-        config=pickle.dumps(load_config([MACHINE])),
+def task(text, joints=False):
+    plan = programs.Plan(
+        config=load_config([MACHINE]),
+        output=Path("out"),
         method="newton",
-        **given,
+        tolerance_um=1.0,
+        joints=joints,
+        version=__version__,
     )
+    return Task(name="p.nc", key="key", data=text.encode(), plan=pickle.dumps(plan))
 
 
 def test_a_worker_gives_back_program_table_and_figures():
