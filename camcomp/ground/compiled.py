@@ -17,7 +17,8 @@ _PLAIN_PYTHON = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # for
 def inner(function: Callable[..., Any], *, fastmath: bool = False, allocates: bool = False) -> Any:
     """Mark a function that only compiled functions call.
 
-    fastmath: sums may be formed in any order, which allows vector instructions. allocates: the code creates arrays or raises.
+    fastmath: sums may be formed in any order, and it writes to no array that overlaps another of its arguments, which allows
+    vector instructions. allocates: the code creates arrays or raises.
     """
     from camcomp.ground.native_code import INNER
 

@@ -73,6 +73,7 @@ def linking_options() -> dict[str, Any]:
         def define_pipelines(self) -> list[Any]:
             """The passes of numba, with a library that is not optimised if numba permits it."""
             state = self.state
+            state.flags.noalias = bool(state.flags.fastmath)  # saves checks in front of every loop
             if _trying or is_usable():
                 state.library = _part_class()(state.targetctx.codegen(), state.func_id.func_qualname)
                 state.library.enable_object_caching()

@@ -106,6 +106,17 @@ class Basis:
         return _products(points, self.position, self.force, self.count)[0]
 
 
+def _fours(count: Any) -> Any:
+    """Counts, up to the next multiples of four, as the compiled look-up takes terms."""
+    return -(-count // 4) * 4
+
+
+def _in_fours(coefficients: Floats, counts: Ints) -> Floats:
+    """Coefficients (sum of counts, k), output by output (k, .), with zeros behind every count up to the next multiple of four."""
+    parts = np.split(coefficients.T, np.cumsum(counts)[:-1], axis=1)
+    return np.concatenate([np.pad(each, ((0, 0), (0, -each.shape[1] % 4))) for each in parts], axis=1)
+
+
 def _pseudoinverse(terms: Floats) -> Floats:
     """Turns answers into coefficients, by least squares; the terms are known to be independent."""
     return np.asarray(np.linalg.solve(terms.T @ terms, terms.T), float)
@@ -251,10 +262,10 @@ class Field:
     def packed(self) -> tuple[Any, ...]:
         """Arguments of the compiled look-up: tiles, bases. The terms of a basis are the first ones of the largest."""
         t, most = self.tiles, self.bases[-1]
-        shape = np.array([(*each.degree, len(each.position), len(each.force)) for each in self.bases])
+        shape = np.array([(*each.degree, _fours(len(each.position)), len(each.force)) for each in self.bases])
         count = np.zeros((len(self.bases), len(most.force)), np.int64)
         for rung, each in enumerate(self.bases):
-            count[rung, : len(each.count)] = each.count
+            count[rung, : len(each.count)] = _fours(each.count)
         return (
             t.centre, t.half, t.rung, t.first, t.W, self.force_mid, self.force_half, shape, count,
         )  # fmt: skip
@@ -380,7 +391,8 @@ class Field:
 
     def _append(self, centre: Floats, half: float, rung: int, both: Floats, alone: Floats) -> int:
         t, basis = self.tiles, self.bases[rung]
-        W = np.concatenate((both.T.ravel(), alone.T.ravel()))
+        parts = _in_fours(both, basis.count), _in_fours(alone, np.array([len(alone)]))
+        W = np.concatenate([each.ravel() for each in parts])
         # slopes at the centre, for the middle force
         n = basis.count[0]
         slope, rates = np.zeros((3, 3)), np.zeros((alone.shape[1], 3))

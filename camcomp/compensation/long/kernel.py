@@ -120,68 +120,74 @@ def distance(p, q):
 
 
 @fast
-def terms(degree, U, lanes, T, out):
+def put_product(first, second, out):
+    """Fills out (LANES,) with products."""
+    for lane in range(LANES):
+        out[lane] = first[lane] * second[lane]
+
+
+@fast
+def terms(degree, U, T, out):
     """Fills out (t, LANES) with the products of Chebyshev polynomials of the rows of U (3, LANES) up to a total degree, lower
-    degrees first, for the first lanes.
+    degrees first.
 
     T (MOST_DEGREE + 4, MOST_DEGREE + 1, LANES) is room to work in: polynomials of the rows, and behind them products of the first two.
     """
     for k in range(3):
-        one, same = T[k, 0], T[k, 1]
-        for lane in range(lanes):
-            one[lane], same[lane] = 1.0, U[k, lane]
-    for d in range(2, degree + 1):
-        for k in range(3):
+        for lane in range(LANES):
+            T[k, 0, lane], T[k, 1, lane] = 1.0, U[k, lane]
+        for d in range(2, degree + 1):
             same, before, last, new = T[k, 1], T[k, d - 2], T[k, d - 1], T[k, d]
-            for lane in range(lanes):
+            for lane in range(LANES):
                 new[lane] = 2.0 * same[lane] * last[lane] - before[lane]
     n = 0
     for total in range(degree + 1):
         for i in range(total + 1):
-            first, second, both = T[0, i], T[1, total - i], T[3 + total, i]
-            for lane in range(lanes):
-                both[lane] = first[lane] * second[lane]
+            put_product(T[0, i], T[1, total - i], T[3 + total, i])
         for k in range(total + 1):
             for i in range(total - k + 1):
-                third, both, row = T[2, k], T[3 + total - k, i], out[n]
-                for lane in range(lanes):
-                    row[lane] = third[lane] * both[lane]
+                put_product(T[2, k], T[3 + total - k, i], out[n])
                 n += 1
 
 
 @fast
-def contract(W, first, A, B, count, outputs, lanes, S, out):
+def add_four(u, v, w, a, t0, t1, t2):
+    """Adds to t0, t1, t2 (LANES,) the sums of the rows of a (4, LANES), times u, v, w (4,) of them."""
+    for lane in range(LANES):
+        p, q, r, s = a[0, lane], a[1, lane], a[2, lane], a[3, lane]
+        t0[lane] = t0[lane] + u[0] * p + u[1] * q + u[2] * r + u[3] * s
+        t1[lane] = t1[lane] + v[0] * p + v[1] * q + v[2] * r + v[3] * s
+        t2[lane] = t2[lane] + w[0] * p + w[1] * q + w[2] * r + w[3] * s
+
+
+@fast
+def add_products(force, t0, t1, t2, s0, s1, s2):
+    """Adds to s0, s1, s2 (LANES,) the products of force (LANES,) with t0, t1, t2."""
+    for lane in range(LANES):
+        s0[lane] += force[lane] * t0[lane]
+        s1[lane] += force[lane] * t1[lane]
+        s2[lane] += force[lane] * t2[lane]
+
+
+@fast
+def contract(W, first, A, B, count, outputs, S, out):
     """Fills out (outputs, LANES) with sums over force terms B (nf, LANES), each times a sum over the first count (nf,) of the
     position terms A (np, LANES); coefficients from `first` on, output by output. S (3, LANES): room to work in.
 
-    Two terms and three outputs at once: every number fetched serves several products, which then set the pace.
+    Four terms and three outputs at once: every number fetched serves several products, which then set the pace. Counts are
+    multiples of four.
     """
     n = count.sum()
-    t0, t1, t2 = S[0], S[1], S[2]
     for o in range(0, outputs, 3):
-        s0, s1, s2 = out[o], out[o + 1], out[o + 2]
         u, v, w = W[first + o * n :], W[first + (o + 1) * n :], W[first + (o + 2) * n :]
-        for lane in range(lanes):
-            s0[lane] = s1[lane] = s2[lane] = 0.0
+        out[o : o + 3] = 0.0
         at = 0
         for b in range(count.shape[0]):
-            for lane in range(lanes):
-                t0[lane] = t1[lane] = t2[lane] = 0.0
-            for a in range(0, count[b], 2):
-                pair = a + 1 < count[b]
-                i, j = at + a, at + a + pair
-                u0, v0, w0 = u[i], v[i], w[i]
-                u1, v1, w1 = (u[j], v[j], w[j]) if pair else (0.0, 0.0, 0.0)
-                a0, a1 = A[a], A[a + pair]
-                for lane in range(lanes):
-                    t0[lane] += u0 * a0[lane] + u1 * a1[lane]
-                    t1[lane] += v0 * a0[lane] + v1 * a1[lane]
-                    t2[lane] += w0 * a0[lane] + w1 * a1[lane]
-            force = B[b]
-            for lane in range(lanes):
-                s0[lane] += force[lane] * t0[lane]
-                s1[lane] += force[lane] * t1[lane]
-                s2[lane] += force[lane] * t2[lane]
+            S[:] = 0.0
+            for a in range(0, count[b], 4):
+                i = at + a
+                add_four(u[i : i + 4], v[i : i + 4], w[i : i + 4], A[a : a + 4], S[0], S[1], S[2])
+            add_products(B[b], S[0], S[1], S[2], out[o], out[o + 1], out[o + 2])
             at += count[b]
 
 
@@ -202,7 +208,7 @@ def look_up(
 def _lanes(*rows: int) -> Floats:
     """Room (*rows, LANES) that begins with a line of the cache: vectors across two of them take half as long again."""
     count = LANES * math.prod(rows)
-    out = np.empty(count + CACHE_LINE)
+    out = np.zeros(count + CACHE_LINE)
     begin = -(out.ctypes.data // out.itemsize) % CACHE_LINE
     return out[begin : begin + count].reshape(*rows, LANES)
 
@@ -224,14 +230,14 @@ def look_up_rows(rows, every, target, force, answer, nominal, tile_of, centre, h
             lanes += 1
         along, across, _, outer = shape[rung[tile]]
         of_both, of_one = count[rung[tile], :outer], shape[rung[tile], 2:3]
-        terms(along, U[:3], lanes, T, A)
-        terms(across, U[3:], lanes, T, B)
-        contract(W, first[tile], A, B, of_both, outputs, lanes, S, out)
+        terms(along, U[:3], T, A)
+        terms(across, U[3:], T, B)
+        contract(W, first[tile], A, B, of_both, outputs, S, out)
         for lane in range(lanes):
             for k in range(outputs):
                 answer[rows[begin + lane], k] = out[k, lane]
         if every:
-            contract(W, first[tile] + (9 + 2 * m) * of_both.sum(), A, B, of_one, m, lanes, S, out)
+            contract(W, first[tile] + (9 + 2 * m) * of_both.sum(), A, B, of_one, m, S, out)
             for lane in range(lanes):
                 for k in range(m):
                     nominal[rows[begin + lane], k] = out[k, lane]
