@@ -304,14 +304,8 @@ class ArmBench:
     def registered(self, k: int, causes: Sequence[Cause]) -> tuple[Registration, LoadedArm]:
         """Campaign k with causes, and the frame and tool vector that fit best to it, or to the fitted one that it shares them with."""
         owner = self.owner[k]
-        campaign, at = self.campaigns[owner], self.start[owner]
-        stood = self.standing(campaign, causes)
-        for _ in range(3):
-            here = stood.tips(at)
-            about = here.mean(axis=0)
-            N = nuisance_columns(here, stood.hung.rotation, about)
-            gap = (at.to_machine(campaign.tip) - here).ravel()
-            at = at.moved(np.asarray(np.linalg.lstsq(N.reshape(-1, 9), gap, rcond=1e-8)[0], float), about)
+        stood = self.standing(self.campaigns[owner], causes)
+        at = self.start[owner].fitted(self.campaigns[owner].tip, stood.tips, stood.hung.rotation)
         return at, stood if owner == k else self.standing(self.campaigns[k], causes)
 
     def gap(self, k: int, causes: Sequence[Cause]) -> Floats:

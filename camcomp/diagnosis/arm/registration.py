@@ -5,6 +5,7 @@ Both are known by this fit alone, so they are nuisances of a campaign and never 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from camcomp.ground.datatypes import Floats
 
-_PASSES = 500
-_DONE_MM = 1e-9
+PASSES = 20
+DONE_MM = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,28 +40,33 @@ class Registration:
             rotation, self.origin + self.rotation @ (step[3:6] + about) - rotation @ about, self.tool + step[6:]
         )
 
+    def fitted(self, measured: Floats, tips: Callable[[Registration], Floats], pose: Floats) -> Registration:
+        """The best one for measured points (n, 3), by Gauss-Newton steps; tips: modelled points (n, 3) under one. What the poses do
+        not show of the tool stays as it was.
+        """
+        at = self
+        for _ in range(PASSES):
+            here = tips(at)
+            about = here.mean(axis=0)
+            N = nuisance_columns(here, pose, about).reshape(-1, 9)
+            step = np.linalg.lstsq(N, (at.to_machine(measured) - here).ravel(), rcond=1e-8)[0]
+            at = at.moved(np.asarray(step, float), about)
+            if np.abs(step[3:]).max() < DONE_MM:
+                break
+        return at
+
 
 def register(measured: Floats, point: Floats, pose: Floats, tool: Floats) -> Registration:
     """Best frame and tool for measured points (n, 3) and platform poses; tool (3,) is the start value.
 
-    Alternates the rotation of corresponding points (Kabsch, Acta Cryst. A 32 (1976) 922) with the linear fit of origin
-    and tool. What the poses do not show of the tool stays as it was.
+    From the rotation of corresponding points: Kabsch, Acta Cryst. A 32 (1976) 922.
     """
-    tool = np.array(tool, float)
-    origin = np.zeros(3)
-    rotation = np.eye(3)
-    for _ in range(_PASSES):
-        tips = point + pose @ tool
-        u, _, vt = np.linalg.svd((tips - tips.mean(0)).T @ (measured - measured.mean(0)))
-        flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))])
-        rotation = vt.T @ flip @ u.T
-        A = np.concatenate([np.broadcast_to(np.eye(3), pose.shape), rotation @ pose], axis=2).reshape(-1, 6)
-        b = (measured - tips @ rotation.T).ravel()
-        step = np.linalg.lstsq(A, b, rcond=1e-6)[0]
-        origin, tool = step[:3], tool + step[3:]
-        if np.abs(step[3:]).max() < _DONE_MM:
-            break
-    return Registration(rotation, origin, tool)
+    tips = point + pose @ np.asarray(tool, float)
+    middle, there = tips.mean(axis=0), measured.mean(axis=0)
+    u, _, vt = np.linalg.svd((tips - middle).T @ (measured - there))
+    rotation = vt.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
+    start = Registration(rotation, there - rotation @ middle, np.asarray(tool, float))
+    return start.fitted(measured, lambda at: at.tips(point, pose), pose)
 
 
 def nuisance_columns(tips: Floats, pose: Floats, about: Floats) -> Floats:
