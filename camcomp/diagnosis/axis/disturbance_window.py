@@ -11,9 +11,8 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.diagnosis.model.window import TRAVEL_BINS, best_window
-from camcomp.diagnosis.statistics.folds import PARTS
 from camcomp.diagnosis.statistics.probability import EVEN
-from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.datatypes import Floats, Ints
 
 END_S = 0.02  # in which most of a push comes or goes, two rows at least; no place ends like that
 SHORTEST_S = 0.2  # of a window
@@ -33,7 +32,7 @@ class Window:
 def find_window(
     values: Mapping[int, Floats], beside: Mapping[int, Floats], times: Mapping[int, Floats], floor: float
 ) -> tuple[Window, Floats] | None:
-    """The window of forces (n,) N that explains most, where it is a push: as large throughout as it is on average; by run.
+    """The window of forces (n,) N by run that explains most, where it is as long and as large as a push.
 
     beside: columns (n, k) that are fitted to the same runs, so that friction and inertia have no part in how long a push lasts.
     With what all else leaves of the window's run (n,), the push still in it.
@@ -55,14 +54,6 @@ def find_window(
     shift, rest = _alone(rests[k], bases[k], first, last)
     if abs(shift) < LEAST_SIZE * floor or times[k][last - 1] - times[k][first] < SHORTEST_S:
         return None
-    # it takes a while to come and to go: rows at its ends are not as high as it is
-    inside, outside = away_from_ends(first, last, times[k])
-    if inside.sum() < PARTS:
-        return None
-    shift = _step(rests[k], inside, outside) / _step(_seen(bases[k], first, last), inside, outside)
-    parts = [float(np.mean(p) - np.mean(rest[outside])) for p in np.array_split(rest[inside], PARTS)]
-    if not all(abs(p - shift) < 0.5 * abs(shift) for p in parts):
-        return None
     return Window(k, first, last, shift), rest
 
 
@@ -79,17 +70,6 @@ def _projected(
     rests = dict(zip(values, np.split(y - Q @ (Q.T @ y), ends), strict=True))
     bases = dict(zip(values, np.split(Q, ends), strict=True))
     return rests, bases
-
-
-def _step(values: Floats, inside: Bools, outside: Bools) -> float:
-    return float(np.mean(values[inside]) - np.mean(values[outside]))
-
-
-def _seen(base: Floats, first: int, last: int) -> Floats:
-    """A unit disturbance force in a window (n,) minus its projection on a basis (n, k)."""
-    push = np.zeros(len(base))
-    push[first:last] = 1.0
-    return np.asarray(push - base @ base[first:last].sum(axis=0))
 
 
 def _alone(rest: Floats, base: Floats, first: int, last: int) -> tuple[float, Floats]:
@@ -112,16 +92,6 @@ def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
     mine = at[window.run][window.first : window.last]
     others = [np.delete(p, slice(window.first, window.last)) if k == window.run else p for k, p in enumerate(at)]
     return float(np.isin(mine, np.concatenate(others)).mean()) > EVEN
-
-
-def away_from_ends(first: int, last: int, time: Floats) -> tuple[Bools, Bools]:
-    """Rows (n,) inside a window and outside of it that are further than END_S from both of its ends; all, where none are."""
-    ends = time[[first, min(last, len(time) - 1)]]
-    far = np.min(np.abs(time[:, None] - ends), axis=1) >= END_S
-    inside = np.zeros(len(time), bool)
-    inside[first:last] = True
-    inside, outside = (on & far if np.any(on & far) else on for on in (inside, ~inside))
-    return inside, outside
 
 
 def sharp(window: Window, rest: Floats, time: Floats) -> bool:

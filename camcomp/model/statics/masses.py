@@ -70,6 +70,12 @@ class _Body:
     def mass_kg(self) -> float:
         return float(np.linalg.norm(self.weight)) / STANDARD_GRAVITY
 
+    def drive(self, joint: _Joint, speeding: Floats) -> Floats:
+        """Force or torque (n,) of the drive of a joint that accelerates the body by `speeding` (n, 3) mm/s2, N or N mm."""
+        inertia = _N_PER_KG_MM_S2 * self.mass_kg * speeding
+        along = np.cross(self.centre - joint.point, inertia) if joint.revolute else inertia
+        return np.asarray(np.einsum("ni,ni->n", joint.axis, along))
+
 
 def has_moved_mass(robot: Robot, actuator: str | None = None) -> bool:
     """Whether the machine file states a mass that this actuator (None: any) moves, in front of a passive joint."""
@@ -112,10 +118,8 @@ def _loads(bodies: Sequence[_Body], speeding: Sequence[Floats], shape: tuple[int
     """Loads of bodies whose centres accelerate by `speeding` (n, 3) mm/s2; shape: rows and actuators."""
     drive, base = np.zeros(shape), np.zeros((shape[0], 6))
     for body, change in zip(bodies, speeding, strict=True):
-        inertia = _N_PER_KG_MM_S2 * body.mass_kg * change
         for joint in body.joints:
-            along = np.cross(body.centre - joint.point, inertia) if joint.revolute else inertia
-            drive[:, joint.index] += np.einsum("ni,ni->n", joint.axis, along)
+            drive[:, joint.index] += body.drive(joint, change)
         base += np.hstack([np.broadcast_to(body.weight, change.shape), np.cross(body.centre, body.weight)])
     return MassLoads(drive, base)
 
@@ -144,11 +148,11 @@ def _all_bodies(robot: Robot, q: Floats) -> Iterator[_Body]:
     """Bodies of all chains along actuator coordinates q (n, m)."""
     start = 0
     for chain in robot.chains:
-        yield from _bodies(chain, q, start)
+        yield from bodies_of(chain, q, start)
         start += sum(isinstance(e, Actuator) for e in chain.elements)
 
 
-def _bodies(chain: Chain, q: Floats, start: int) -> Iterator[_Body]:
+def bodies_of(chain: Chain, q: Floats, start: int = 0) -> Iterator[_Body]:
     """Bodies of a chain, along actuator coordinates q (n, m); start: index of the chain's first actuator."""
     n = len(q)
     rotation, point = np.broadcast_to(chain.frame, (n, 3, 3)), np.zeros((n, 3))

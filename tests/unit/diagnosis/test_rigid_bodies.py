@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from camcomp.diagnosis.axis.rigid_bodies import torque_columns
+from camcomp.diagnosis.axis.rigid_bodies import PLACES, torque_columns
 from camcomp.ground.datatypes import STANDARD_GRAVITY
 from camcomp.model.statics.arm import ARM_LENGTH
 from camcomp.model.statics.description import Actuator, Chain, Transform
@@ -41,12 +41,17 @@ def place(q, link, centre, hinges):
         at, turned = at + turned.apply(way), turned * Rotation.from_euler("xyz", turn, degrees=True)
 
 
-def parameters(link, mass, centre):
-    """Ten numbers of a point mass, in t and multiples of ARM_LENGTH, in those of its link among three."""
+def moments(centre):
+    """Mass, first moments and moments of inertia (10,) of a unit mass at a point, in multiples of ARM_LENGTH."""
     c = np.array(centre) / ARM_LENGTH
     inertia = np.dot(c, c) * np.eye(3) - np.outer(c, c)
+    return np.array([1.0, *c, *inertia[np.triu_indices(3)]])
+
+
+def parameters(link, mass, centre):
+    """Masses, t, at the places of a link among three that move like a point mass of it."""
     out = np.zeros((3, 10))
-    out[link] = 1e-3 * mass * np.array([1.0, *c, *inertia[np.triu_indices(3)]])
+    out[link] = 1e-3 * mass * np.linalg.solve(np.transpose([moments(each) for each in PLACES]), moments(centre))
     return out
 
 
