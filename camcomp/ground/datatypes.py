@@ -46,7 +46,19 @@ def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Path:
+class Curves:
+    """Lines and arcs (n,) of the tool tip, mm, program frame."""
+
+    kind: NDArray[np.int8]  # (n,) RAPID, LINE or ARC
+    start: Floats  # (n, 3) mm
+    end: Floats  # (n, 3) mm
+    centre: Floats  # (n, 3) mm, arc centre at the height of the start; NaN for lines and rapids
+    axis: Floats  # (n, 3) unit normal of the arc plane: +X, +Y or +Z of G19, G18, G17; 0 for lines and rapids
+    angle: Floats  # (n,) rad about `axis`, + = counter-clockwise seen from its tip; extra turns add 2 pi
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Path(Curves):
     """Programmed path of the tool tip: n motions in program order, independent of the dialect.
 
     Points are tool tips in mm in the program frame of G54 at program start; all other offsets are resolved. Raises
@@ -54,12 +66,6 @@ class Path:
     """
 
     line: Ints  # (n,) source line, counted from 1
-    kind: NDArray[np.int8]  # (n,) RAPID, LINE or ARC
-    start: Floats  # (n, 3) mm
-    end: Floats  # (n, 3) mm
-    centre: Floats  # (n, 3) mm, arc centre at the height of the start; NaN for lines and rapids
-    axis: Floats  # (n, 3) unit normal of the arc plane: +X, +Y or +Z of G19, G18, G17; 0 for lines and rapids
-    angle: Floats  # (n,) rad about `axis`, + = counter-clockwise seen from its tip; extra turns add 2 pi
     feed: Floats  # (n,) mm/min of the tip; NaN for rapids
     speed: Floats  # (n,) spindle, rev/min
     turn: Floats  # (n,) direction of the spindle: +1 clockwise (M3), -1 (M4), 0 stopped (M5, S0), NaN: not stated

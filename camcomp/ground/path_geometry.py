@@ -1,4 +1,4 @@
-"""Points, directions and lengths along the motions of a Path, for arrays of (motion, u), u in [0, 1] of the motion.
+"""Points, directions and lengths along the motions of a Path, or other Curves, for arrays of (motion, u), u in [0, 1] of the motion.
 
 Arcs turn uniformly with u; where the end lies on another radius than the start the radius changes linearly (as controls
 do within their radius tolerance), and a helix climbs linearly.
@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from camcomp.ground.compiled import entry
-from camcomp.ground.datatypes import ARC, Floats, Ints, Path
+from camcomp.ground.datatypes import ARC, Curves, Floats, Ints
 from camcomp.ground.vectors import sizes
 
 
@@ -47,7 +47,7 @@ def turn(vectors: Floats, axis: Floats, angle: Floats) -> Floats:
     return out
 
 
-def _arc(path: Path, motion: Ints) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+def _arc(path: Curves, motion: Ints) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Radius vector at the start, climb along the axis, end/start radius - 1, axis, angle, per row."""
     axis, angle = path.axis[motion], path.angle[motion]
     first = path.start[motion] - path.centre[motion]
@@ -59,7 +59,7 @@ def _arc(path: Path, motion: Ints) -> tuple[Floats, Floats, Floats, Floats, Floa
     return first, climb, sizes(last) / radius - 1.0, axis, angle
 
 
-def points(path: Path, motion: Ints, u: Floats) -> Floats:
+def points(path: Curves, motion: Ints, u: Floats) -> Floats:
     """Programmed tip (k, 3) mm at fraction u (k,) of motion (k,). Ends are exactly the programmed ones."""
     out = np.empty((len(motion), 3))
     between_ends(path.start, path.end, motion, u, out)
@@ -77,7 +77,7 @@ def points(path: Path, motion: Ints, u: Floats) -> Floats:
     return out
 
 
-def tangents(path: Path, motion: Ints, u: Floats) -> Floats:
+def tangents(path: Curves, motion: Ints, u: Floats) -> Floats:
     """Unit direction of travel (k, 3); zero where the motion has no length."""
     if not (path.kind == ARC).any():
         found = np.empty((len(motion), 3))
@@ -98,7 +98,7 @@ def tangents(path: Path, motion: Ints, u: Floats) -> Floats:
     return np.asarray(np.divide(out, size, out=np.zeros_like(out), where=size > 0.0))
 
 
-def lengths(path: Path) -> Floats:
+def lengths(path: Curves) -> Floats:
     """Length (n,) mm of every motion (of a spiral to second order in its change of radius)."""
     out = sizes(path.end - path.start)
     arc = np.flatnonzero(path.kind == ARC)

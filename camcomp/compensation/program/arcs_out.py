@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from camcomp.compensation.program.chords import SHARE, Nodes, divide
-from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, Bools, Floats, Ints
 from camcomp.ground.records import dataclass
 from camcomp.ground.vectors import sizes
@@ -78,37 +77,10 @@ class Bend:
         return divide(trial, second, tolerance, least)
 
 
-@dataclass(frozen=True, eq=False)
-class Arcs:
-    """Circles on which moves (k,) run; the centre is NaN for a straight line."""
+def through(start: Floats, middle: Floats, end: Floats, axis: Floats, way: Floats, flat: float) -> tuple[Floats, Bools]:
+    """Centres (k, 3) of arcs through three points each (k, 3) about axes (k, 3), way (k,) > 0 counter-clockwise.
 
-    centre: Floats  # (k, 3) mm, at the height of the start
-    angle: Floats  # (k,) rad, signed
-
-    @classmethod
-    def none(cls, n: int) -> Arcs:
-        """Straight lines only."""
-        return cls(np.full((n, 3), np.nan), np.zeros(n))
-
-    @property
-    def on(self) -> Bools:
-        """Which moves are arcs."""
-        return np.isfinite(self.centre[:, 0])
-
-    def take(self, rows: np.ndarray) -> Arcs:
-        """Some of the moves."""
-        return Arcs(self.centre.take(rows, axis=0), self.angle[rows])
-
-    def followed_by(self, n: int) -> Arcs:
-        """With n straight lines behind."""
-        lines = Arcs.none(n)
-        return Arcs(np.concatenate((self.centre, lines.centre)), np.concatenate((self.angle, lines.angle)))
-
-
-def through(start: Floats, middle: Floats, end: Floats, axis: Floats, way: Floats, flat: float) -> tuple[Arcs, Bools]:
-    """Arcs through three points each (k, 3) about axes (k, 3), way (k,) > 0 counter-clockwise.
-
-    Lines where the arc is not `flat` mm from its chord. The second result says which ones turn the wrong way.
+    NaN where the arc is not `flat` mm from its chord. The second result says which ones turn the wrong way.
     """
 
     def level(vector: Floats) -> Floats:
@@ -124,8 +96,7 @@ def through(start: Floats, middle: Floats, end: Floats, axis: Floats, way: Float
     double = np.where(good, -2.0 * area, 1.0)[:, None]
     square_a, square_b = np.sum(a**2, axis=1, keepdims=True), np.sum(b**2, axis=1, keepdims=True)
     radius = (square_b * np.cross(axis, a) - square_a * np.cross(axis, b)) / double  # from the start to the centre
-    centre = np.where(good[:, None], start + radius, np.nan)
-    return Arcs(centre, np.where(good, sweeps(start, end, centre, axis, way), 0.0)), wrong
+    return np.where(good[:, None], start + radius, np.nan), wrong
 
 
 def sweeps(start: Floats, end: Floats, centre: Floats, axis: Floats, way: Floats) -> Floats:
@@ -135,41 +106,6 @@ def sweeps(start: Floats, end: Floats, centre: Floats, axis: Floats, way: Floats
     cosine -= np.sum(p * axis, axis=1) * np.sum(q * axis, axis=1)
     angle = np.arctan2(sine, cosine)
     out: Floats = np.where(way > 0.0, np.mod(angle, 2.0 * np.pi), -np.mod(-angle, 2.0 * np.pi))
-    return out
-
-
-def stated_sweeps(start: Floats, end: Floats, centre: Floats, axis: Floats, angle: Floats) -> Floats:
-    """Signed angles (k,) rad between start and end, with the whole turns of the stated ones; angle (k,) rad."""
-    sweep = sweeps(start, end, centre, axis, angle)
-    out: Floats = sweep + 2.0 * np.pi * np.round((angle - sweep) / (2.0 * np.pi))
-    return out
-
-
-def lengths(start: Floats, end: Floats, arcs: Arcs, axis: Floats, motion: Ints) -> Floats:
-    """Lengths (k,) mm of moves that may be arcs; axis (n, 3) of the motions (k,) that they belong to."""
-    out = sizes(end - start)
-    on = np.flatnonzero(arcs.on)
-    if len(on):
-        p, axis = start[on] - arcs.centre[on], axis[motion[on]]
-        p = p - np.sum(p * axis, axis=1, keepdims=True) * axis
-        climb = np.sum((end - start)[on] * axis, axis=1)
-        out[on] = np.hypot(sizes(p) * np.abs(arcs.angle[on]), climb)
-    return out
-
-
-def along(start: Floats, end: Floats, arcs: Arcs, axis: Floats, f: Floats) -> Floats:
-    """Points (k, 3) at fraction f (k,) of moves that may be arcs; radius and height go linearly from start to end."""
-    out = start + f[:, None] * (end - start)
-    on = np.flatnonzero(arcs.on)
-    if len(on):
-        a, s, e, c = axis[on], start[on], end[on], arcs.centre[on]
-        p, q = s - c, e - c
-        low, high = np.sum(p * a, axis=1), np.sum(q * a, axis=1)
-        p, q = p - low[:, None] * a, q - high[:, None] * a
-        angle = stated_sweeps(s, e, c, a, arcs.angle[on])
-        growth = sizes(q) / np.maximum(sizes(p), 1e-300) - 1.0
-        height = low + f[on] * (high - low)
-        out[on] = c + path_geometry.turn(p, a, f[on] * angle) * (1.0 + growth * f[on])[:, None] + height[:, None] * a
     return out
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.program import arcs_out
-from camcomp.compensation.program.arcs_out import Arcs, Bend
+from camcomp.compensation.program.arcs_out import Bend
 from camcomp.compensation.program.chords import COARSE_MM, Nodes, second_derivative, trial_nodes
 from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of, times_of
 from camcomp.compensation.program.judged_points import (
@@ -52,6 +52,7 @@ from camcomp.compensation.program.under_control import (
 from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
+from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.progress import part as part_of_work
 from camcomp.ground.records import dataclass, replace
@@ -280,8 +281,8 @@ class _Correction:
                 tolerance[gone] = self.budget[gone]
                 nodes, shift = bend.divided(self.trial, tolerance)
             with part_of_work(1.0 - 0.6 * 0.5**round_, 1.0 - 0.35 * 0.5**round_, points=True):
-                commanded, circles, words = self._bent(nodes, shift, bend)
-            found = self._written(nodes, commanded, circles, words)
+                commanded, centre, words = self._bent(nodes, shift, bend)
+            found = self._written(nodes, commanded, centre, words)
             missed = (found.worst > self.goal) & ~self.kept
             finer = tolerance * np.clip(0.9 * self.goal / np.maximum(found.worst, 1e-12), 0.3, 0.9)
             sagging = (found.points.sags(found.after.error, len(missed)) > self.budget) & ~self.whole
@@ -317,40 +318,40 @@ class _Correction:
         tolerance[bend.use] = rounded[bend.use]
         return bend, tolerance
 
-    def _bent(self, nodes: Nodes, shift: Floats, bend: Bend) -> tuple[Floats, Arcs, Floats | None]:
-        """Commanded tips (k, 3) at nodes, the circles of the moves that lead there as arcs, and the words (k, 3) of the
-        orientation there. Turns off what cannot bend.
+    def _bent(self, nodes: Nodes, shift: Floats, bend: Bend) -> tuple[Floats, Floats, Floats | None]:
+        """Commanded tips (k, 3) at nodes, centres (k, 3) of the moves that lead there as arcs, NaN for lines, and the words
+        (k, 3) of the orientation there. Turns off what cannot bend.
         """
         track = self.track
         both, middle = arcs_out.middles(nodes, bend.use)
         aimed = self._aim_at_others(both)
         solved = aimed.commanded
         commanded = solved.compress(~middle, axis=0) + shift[:, :3]
-        circles = Arcs.none(len(commanded))
+        centre = np.full((len(commanded), 3), np.nan)
         to = np.flatnonzero((np.diff(nodes.piece, prepend=-1) == 0) & bend.use[nodes.piece])
         if len(to):
             motion = track.motion[nodes.piece[to]]
-            found, wrong = arcs_out.through(
+            centre[to], wrong = arcs_out.through(
                 start=commanded[to - 1], middle=solved[middle], end=commanded[to], axis=track.path.axis[motion],
                 way=track.path.angle[motion], flat=arcs_out.FLATTEST * self.step,
             )  # fmt: skip
-            circles.centre[to], circles.angle[to] = found.centre, found.angle
             bend.use[nodes.piece[to[wrong]]] = False
         if self.orienting is None:
-            return commanded, circles, None
+            return commanded, centre, None
         turned = shift[:, 3:] / self.orienting.length(1e-3 * self.tolerance_um)
-        return commanded, circles, aimed.words[~middle] + turned
+        return commanded, centre, aimed.words[~middle] + turned
 
-    def _written(self, nodes: Nodes, commanded: Floats, circles: Arcs, words: Floats | None) -> _Division:
+    def _written(self, nodes: Nodes, commanded: Floats, centre: Floats, words: Floats | None) -> _Division:
         """The program written with commanded tips (k, 3) at nodes, and seen by the full model."""
         job, track, part = self.job, self.track, self.part
         rows = corrected_rows(
-            self.program, job, track=track, nodes=nodes, commanded=commanded, kept=self.kept, circles=circles,
+            self.program, job, track=track, nodes=nodes, commanded=commanded, kept=self.kept, centre=centre,
             begins=part is None or part.first == 0, shares=self.shares, orienting=self.orienting, words=words,
         )  # fmt: skip
         written = self._rewritten(rows)
         points = judged_points(job, track, rows, self.feeding & ~self.pushed)
-        told = points.along(written.end, replace(rows.arcs, centre=written.centre))
+        curves = rows.curves(self.program.path, written.end, written.centre)
+        told = path_geometry.points(curves, points.row, points.fraction)
         after = see(job, points, told, self.orienting, written.words)
         missed = after.error
         if self.shares is not None:
@@ -365,7 +366,7 @@ class _Correction:
 
     def _rewritten(self, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Rewritten:
         return rewrite(
-            self.program, output_of(self.program.path, rows, rest, apart), part=self.part, version=self.version,
+            self.program, output_of(rows, rest, apart), part=self.part, version=self.version,
             resolution_mm=self.job.config.control.resolution_mm, model=self.job.fingerprint,
         )  # fmt: skip
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from camcomp.compensation.program import arcs_out
-from camcomp.compensation.program.arcs_out import Arcs
+from camcomp.compensation.program.arcs_out import sweeps
 from camcomp.compensation.program.chords import Nodes
 from camcomp.compensation.program.moves import refuse_unsolved, row_layout, travel_of
 from camcomp.compensation.program.orienting import Orienting, aim_along
 from camcomp.gcode.output import Output
 from camcomp.gcode.program import Program
-from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
+from camcomp.ground import path_geometry
+from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Curves, Floats, Ints, Path
 from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
@@ -30,26 +31,31 @@ class CorrectedRows:
     piece: Ints
     motion: Ints
     w: Floats  # fraction of the piece at the end point
-    kind: Ints
+    kind: NDArray[np.int8]
     joining: Bools
     corrected: Bools  # False: passes as programmed
     force: Floats  # (N, 3) N at the end point, program frame
     target: Floats  # (N, 3) mm programmed tip
     end: Floats  # (N, 3) mm commanded tip, program frame
     feed: Floats  # (N,) mm/min
-    arcs: Arcs  # (N,) circles of corrected arcs that come out as arcs
+    centre: Floats  # (N, 3) mm, of arcs
+    angle: Floats  # (N,) rad, of arcs
+    bent: Bools  # corrected arcs that come out as arcs
     engagement: Floats  # (N, 2) depth of the cut mm, sum of the engaged arcs rad; NaN where no stock is known
     words: Floats | None = None  # (N, 3) of the orientation to be commanded; None: those of the program, if any
 
-    def sweeps(self, path: Path) -> Floats:
-        """Signed angles (N,) rad of the moves that are arcs, corrected or as programmed; 0 for lines."""
-        out: Floats = np.where(self.arcs.on, self.arcs.angle, path.angle[self.motion])
-        return np.where(self.kind == ARC, out, 0.0)
-
-    def centres(self, path: Path, corrected: Floats) -> Floats:
-        """Centres (N, 3) mm of the moves that are arcs, as `corrected` (N, 3) has them or as programmed."""
-        programmed = (self.kind == ARC) & ~np.isfinite(corrected[:, 0])
-        return np.where(programmed[:, None], path.centre.take(self.motion, axis=0), corrected)
+    def curves(self, path: Path, end: Floats, centre: Floats) -> Curves:
+        """The moves (N,) with these end points (N, 3), and centres (N, 3) of corrected arcs; NaN makes a line of them."""
+        motion, bent = self.motion, np.flatnonzero(self.bent)
+        start = np.concatenate((path.start[motion[:1]], end[:-1]))
+        axis, kind, centres, angle = path.axis.take(motion, axis=0), self.kind, self.centre, self.angle
+        if len(bent):
+            a, b, n, c = start[bent], end[bent], axis[bent], centre[bent]
+            c = c + np.sum((a - c) * n, axis=1, keepdims=True) * n  # at the height of the start as it is rounded
+            kind, centres, angle = kind.copy(), centres.copy(), angle.copy()
+            kind[bent] = np.where(np.isfinite(c[:, 0]), ARC, LINE)
+            centres[bent], angle[bent] = c, sweeps(a, b, c, n, angle[bent])
+        return Curves(kind=kind, start=start, end=end, centre=centres, axis=axis, angle=angle)
 
 
 def corrected_rows(
@@ -60,7 +66,7 @@ def corrected_rows(
     *,
     commanded: Floats,
     kept: Bools,
-    circles: Arcs,
+    centre: Floats,
     begins: bool,
     shares: Shares | None = None,
     orienting: Orienting | None = None,
@@ -68,7 +74,8 @@ def corrected_rows(
 ) -> CorrectedRows:
     """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps.
 
-    words (k, 3): of the orientation at the nodes, where there are some.
+    centre (k, 3): of the moves that lead to the nodes as arcs, NaN for lines. words (k, 3): of the orientation at the nodes,
+    where there are some.
     """
     path = program.path
     k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
@@ -84,11 +91,11 @@ def corrected_rows(
     joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
     free, turned = _behind_cuts(program, job, track, extra, shares=shares, orienting=orienting)
     end = np.concatenate((commanded.take(keep, axis=0), free))
-    circles = circles.take(keep).followed_by(len(extra))
+    centre = np.concatenate((centre.take(keep, axis=0), np.full((len(extra), 3), np.nan)))
     order = np.arange(len(piece))
     if len(extra):
         order = np.lexsort((joining & (w > 0.0), w, piece))
-        piece, w, joining, end, circles = piece[order], w[order], joining[order], end[order], circles.take(order)
+        piece, w, joining, end, centre = piece[order], w[order], joining[order], end[order], centre[order]
     trailing_row = joining & (w > 0.0)
     target = track.points(piece, w)
     force = track.force(piece, w)
@@ -96,19 +103,24 @@ def corrected_rows(
     rows_kind = np.where(kind[piece] == RAPID, RAPID, LINE)
     passed = ~layout.corrected[piece]
     whole = (passed | kept[piece]) & ~joining & (np.bincount(piece, minlength=len(kind)) == 1)[piece]
-    rows_kind = np.where(circles.on, ARC, np.where(whole, kind[piece], rows_kind))
-    end[whole & ~circles.on] = target[whole & ~circles.on]
+    motion, bent = track.motion[piece], np.isfinite(centre[:, 0])
+    rows_kind = np.where(bent, ARC, np.where(whole, kind[piece], rows_kind)).astype(np.int8)
+    end[whole & ~bent] = target[whole & ~bent]
+    if len(own := np.flatnonzero((rows_kind == ARC) & ~bent)):
+        centre[own] = path.centre[motion[own]]
     engagement = (
         np.broadcast_to(np.nan, (len(piece), 2)) if track.engaged is None else np.column_stack(track.sizes(piece, w))
     )
     if orienting is not None and words is not None:
         words = np.concatenate((words[keep], turned))[order]
         words[whole] = orienting.programmed(track, piece, w)[whole]
+    angle = np.where(rows_kind == ARC, path.angle[motion], 0.0)
     rows = CorrectedRows(
-        piece=piece, motion=track.motion[piece], w=w, kind=rows_kind, joining=joining, corrected=~passed, force=force,
-        target=target, end=end, feed=np.empty(len(piece)), arcs=circles, engagement=engagement, words=words,
+        piece=piece, motion=motion, w=w, kind=rows_kind, joining=joining, corrected=~passed, force=force, target=target,
+        end=end, feed=np.empty(len(piece)), centre=centre, angle=angle, bent=bent, engagement=engagement, words=words,
     )  # fmt: skip
-    return replace(rows, feed=_feeds(program, track, rows))
+    curves = rows.curves(path, end, centre)
+    return replace(rows, angle=curves.angle, feed=_feeds(program, track, rows, path_geometry.lengths(curves)))
 
 
 def _behind_cuts(
@@ -128,16 +140,14 @@ def _behind_cuts(
     return shares.taken(track, behind, np.zeros(len(piece)), target, result.commanded), turned
 
 
-def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
-    """Feed of every row so that the tip keeps its programmed speed: scaled by commanded over programmed length."""
+def _feeds(program: Program, track: Track, rows: CorrectedRows, commanded: Floats) -> Floats:
+    """Feed of every row so that the tip keeps its programmed speed: scaled by commanded (N,) mm over programmed length."""
     feed = program.path.feed[rows.motion]
-    start = np.concatenate((program.path.start[:1], rows.end[:-1]))
     same = np.concatenate(([False], (rows.piece[1:] == rows.piece[:-1])))
     w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
     programmed = (rows.w - w0) * track.length[rows.piece]
-    commanded = arcs_out.lengths(start, rows.end, rows.arcs, program.path.axis, rows.motion)
     scale = np.divide(commanded, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
-    unscaled = rows.joining | ((rows.kind != LINE) & ~rows.arcs.on) | ~rows.corrected | (programmed < 0.01)
+    unscaled = rows.joining | ((rows.kind != LINE) & ~rows.bent) | ~rows.corrected | (programmed < 0.01)
     return np.where(unscaled, feed, feed * np.clip(scale, 0.2, 5.0))
 
 
@@ -149,9 +159,9 @@ def times_of(job: Job, program: Program, rows: CorrectedRows, s: Floats) -> Floa
     return out
 
 
-def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Output:
+def output_of(rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Output:
     """The rows in the form of the writer. rest, apart (N,): force a stop at the end, forbid merging."""
     return Output(
-        motion=rows.motion, kind=rows.kind.astype(np.int8), end=rows.end, centre=rows.centres(path, rows.arcs.centre),
-        angle=rows.sweeps(path), feed=rows.feed, joining=rows.joining, rest=rest, apart=apart, words=rows.words,
+        motion=rows.motion, kind=rows.kind, end=rows.end, centre=rows.centre, angle=rows.angle, feed=rows.feed,
+        joining=rows.joining, rest=rest, apart=apart, words=rows.words,
     )  # fmt: skip

@@ -7,14 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.compensation.program import arcs_out
-from camcomp.compensation.program.arcs_out import Arcs
 from camcomp.compensation.program.corrected_rows import CorrectedRows
 from camcomp.compensation.program.moves import WITHIN_RAPID, travel_of
 from camcomp.compensation.program.orienting import Orienting
-from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
+from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
-from camcomp.ground.path_geometry import between_ends
 from camcomp.ground.records import dataclass, fields, replace
 from camcomp.ground.vectors import largest_of_groups, sizes
 from camcomp.model.cutting.track import Track
@@ -32,13 +29,11 @@ class JudgedPoints:
 
     row: Ints  # (k,) end point that the point belongs to
     fraction: Floats  # (k,) of the move to it, 1 at its end
-    axis: Floats  # (k, 3) of arcs
     piece: Ints
     w: Floats
     target: Floats  # (k, 3) mm programmed tip
     travel: Travel
     judged: Bools  # (k,) counted in before and after: feed motions, no joining lines
-    kept: Bools  # (k,) between the ends of an arc that stays as programmed
     before: Floats | None  # (3,) where the first move starts, if that is known
     near: Any = None  # response of a machine without effects that is interpolated, around the targets
 
@@ -56,19 +51,6 @@ class JudgedPoints:
         sag = sizes(middle - 0.5 * (before + behind))
         return largest_of_groups(sag, self.piece[at], pieces)
 
-    def along(self, ends: Floats, arcs: Arcs) -> Floats:
-        """Points (k, 3) of the moves between end points (N, 3)."""
-        first = ends[:1] if self.before is None else self.before[None]
-        start = np.concatenate((first, ends[:-1]))
-        out = np.empty((len(self.row), 3))
-        between_ends(start, ends, self.row, self.fraction, out)
-        on = np.flatnonzero(arcs.on[self.row] & ~self.end)
-        if len(on):
-            row = self.row[on]
-            out[on] = arcs_out.along(start[row], ends[row], arcs.take(row), self.axis[on], self.fraction[on])
-        out[self.kept] = self.target[self.kept]
-        return out
-
 
 def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -> JudgedPoints:
     """End points of the rows, and points between them on `feeding` pieces (p,)."""
@@ -77,7 +59,7 @@ def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -
     begins = np.concatenate(([True], rows.piece[1:] != rows.piece[:-1])) | np.concatenate(([True], rows.joining[:-1]))
     start = np.where(begins, 0.0, np.concatenate(([0.0], rows.w[:-1])))
     inner = np.flatnonzero(cut & (track.length[rows.piece] > 0.0))
-    bent = inner[rows.arcs.on[inner]]
+    bent = inner[rows.bent[inner]]
     rapid = np.flatnonzero((rows.kind == RAPID) & rows.corrected) if job.causes else inner[:0]
     row = np.concatenate((np.arange(n), inner, bent, bent, np.repeat(rapid, len(WITHIN_RAPID))))
     fraction = np.repeat([1.0, 0.5, 0.25, 0.75], [n, len(inner), len(bent), len(bent)])
@@ -90,18 +72,13 @@ def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -
     travel = travel_of(job, track, piece, w)
     force = travel.force
     force[end] = job.frame.vectors(rows.force)  # joining lines know better
-    kept = ~end & ((rows.kind == ARC) & ~rows.arcs.on)[row]
-    axis = np.broadcast_to(np.zeros(3), (len(piece), 3))
-    if len(bent):
-        axis = track.path.axis[track.motion[piece]]
     travel = replace(travel, force=force)
     before = track.path.start[0] if n and track.path.known[0] else None
     target, near, answers = track.points(piece, w), None, job.real_machine.answers
     if answers is not None and not job.causes and travel.rotation is None:
         near = answers.near(job.frame.to_machine(target), travel.force, end)
     return JudgedPoints(
-        row=row, fraction=fraction, axis=axis, piece=piece, w=w, target=target, travel=travel, judged=cut[row], kept=kept,
-        before=before, near=near,
+        row=row, fraction=fraction, piece=piece, w=w, target=target, travel=travel, judged=cut[row], before=before, near=near,
     )  # fmt: skip
 
 

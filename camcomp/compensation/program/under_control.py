@@ -12,19 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.control_account import ControlAccount, FarOff, PointsOnMoves
 from camcomp.compensation.program.result import CycleTime
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.path_mode import PathMode, numbered
 from camcomp.gcode.program import Program
-from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
+from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import largest, sizes
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job
-from camcomp.model.trajectory.moves import ControlLimits, ToolMoves, mode_columns, moves_of
+from camcomp.model.trajectory.moves import ControlLimits, ToolMoves, moves_of
 from camcomp.model.trajectory.plan import ControlPlan, plan_of
 
 if TYPE_CHECKING:
@@ -194,9 +193,12 @@ def under_control(
     told, missed (k, 3) mm: written program and its tip errors at the points. rest, apart (N,): forced stops, unmerged lines.
     tolerance_um: beyond which the controller is warned of.
     """
-    moves = written_moves(program, job, rows, written, rest)
-    if apart is not None:
-        moves = replace(moves, merge=np.where(apart, 0.0, moves.merge))
+    programmed = programmed_moves(program, job)
+    own = programmed.take(rows.motion)
+    moves = replace(
+        own, **vars(rows.curves(program.path, written.end, written.centre)), feed=job.conditions.feeds(written.feed),
+        exact=own.exact | rest, waits=_waits(program, rows), merge=own.merge if apart is None else np.where(apart, 0.0, own.merge),
+    )  # fmt: skip
     judged = np.flatnonzero(points.judged)
     row = points.row[judged]
     joining = np.concatenate((rows.joining, [False]))
@@ -205,7 +207,7 @@ def under_control(
         line=program.path.line[rows.motion[row]], joined=joining[row - 1] | joining[row + 1],
     )  # fmt: skip
     return UnderControl(
-        programmed=programmed_moves(program, job), written=moves, limits=limits_of(job.config),
+        programmed=programmed, written=moves, limits=limits_of(job.config),
         tolerance_mm=1e-3 * tolerance_um, modes=modes_of(program), points=on_moves, rest=rest,
         apart=apart is not None,
     )  # fmt: skip
@@ -240,25 +242,6 @@ def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:
 def programmed_moves(program: Program, job: Job) -> ToolMoves:
     """The moves of a program, with the feed of the machine file where none is in force."""
     return moves_of(program.path, program.modes, job.conditions.feeds(program.path.feed), program.per_turn)
-
-
-def written_moves(program: Program, job: Job, rows: CorrectedRows, written: Rewritten, rest: Bools) -> ToolMoves:
-    """The moves of a program that was corrected as they are written, with stops at end points `rest` (N,)."""
-    path = program.path
-    motion, arc = rows.motion, rows.kind == ARC
-    bent = np.isfinite(written.centre[:, 0])
-    end = written.end
-    start = np.concatenate((path.start[motion[:1]], end[:-1]))
-    centre, axis = rows.centres(path, written.centre), path.axis.take(motion, axis=0)
-    angle = rows.sweeps(path)
-    angle[bent] = arcs_out.stated_sweeps(start[bent], end[bent], centre[bent], axis[bent], angle[bent])
-    exact, stop, tolerance, merged = mode_columns(program.modes)
-    return ToolMoves(
-        kind=np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64), start=start, end=end,
-        centre=centre, axis=axis, angle=angle, feed=job.conditions.feeds(written.feed), exact=exact[motion] | rest,
-        waits=_waits(program, rows), stop=(stop | path.machine)[motion], tolerance=tolerance[motion], merge=merged[motion],
-        per_turn=program.per_turn[motion],
-    )  # fmt: skip
 
 
 def _waits(program: Program, rows: CorrectedRows) -> Bools:

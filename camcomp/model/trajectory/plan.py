@@ -65,7 +65,7 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
     arc = kind == ARC
     if arc.any():
         at = np.flatnonzero(arc)
-        path = moves.take(last[at]).path()
+        path = moves.take(last[at])
         every, zeros = np.arange(len(at)), np.zeros(len(at))
         arrive, axis, middle = leave.copy(), np.zeros((m, 3)), np.zeros((m, 3))
         leave[at], arrive[at] = (path_geometry.tangents(path, every, zeros + u) for u in (0.0, 1.0))
@@ -99,7 +99,7 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
 
 
 def _speeds(
-    kind: Ints, feed: Floats, nominal: Floats, radius: Floats, most: Floats, limits: ControlLimits
+    kind: np.ndarray, feed: Floats, nominal: Floats, radius: Floats, most: Floats, limits: ControlLimits
 ) -> tuple[Floats, Floats]:
     """Largest speeds (m,) mm/s along segments within the limits of every axis: at the feed, and at any feed."""
     velocity = limits.velocity * most

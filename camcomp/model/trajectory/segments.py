@@ -35,7 +35,7 @@ def segments(moves: ToolMoves) -> Segments:
     size = np.empty(n)
     straight(*read_only(moves.start, moves.end), size, np.empty((n, 3)), np.empty(n))
     if len(bent := np.flatnonzero(moves.kind == ARC)):
-        size[bent] = path_geometry.lengths(moves.take(bent).path())
+        size[bent] = path_geometry.lengths(moves.take(bent))
     group, first, last = (np.zeros(n, np.int64) for _ in range(3))
     joins = (moves.kind == LINE) & ~moves.exact
     goes = size > SHORTEST

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from camcomp.compensation.program import arcs_out
-from camcomp.compensation.program.arcs_out import Arcs
 from camcomp.compensation.program.chords import Nodes, divide
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.verify import verify
 from camcomp.gcode.interpret import read_program
 from camcomp.ground import path_geometry
-from camcomp.ground.datatypes import ARC
+from camcomp.ground.datatypes import ARC, Curves
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.job import Job
@@ -33,15 +32,15 @@ def test_an_arc_is_found_from_three_of_its_points(axis, turn):
     at = 0.7 + turn * np.linspace(0.0, 1.0, 9)
     points = on_circle(axis, at, climb=0.2)
     three, axes = points[[0, 4, 8], None], axis[None]
-    arcs, wrong = arcs_out.through(*three, axes, np.array([turn]), 1e-4)
-    assert not wrong.any() and arcs.on.all()
-    assert arcs.angle[0] == pytest.approx(turn, abs=1e-12)
-    assert arcs.centre[0] - points[0] == pytest.approx(np.array([1.0, 2, 4]) + 0.14 * axis - points[0], abs=1e-12)
-    start, end = (np.repeat(each, 9, axis=0) for each in (three[0], three[2]))
-    again = arcs_out.along(start, end, arcs.take(np.zeros(9, int)), np.repeat(axes, 9, axis=0), np.linspace(0, 1, 9))
+    centre, wrong = arcs_out.through(*three, axes, np.array([turn]), 1e-4)
+    assert not wrong.any() and np.isfinite(centre).all()
+    angle = arcs_out.sweeps(three[0], three[2], centre, axes, np.array([turn]))
+    assert angle[0] == pytest.approx(turn, abs=1e-12)
+    assert centre[0] - points[0] == pytest.approx(np.array([1.0, 2, 4]) + 0.14 * axis - points[0], abs=1e-12)
+    arc = Curves(kind=np.array([ARC]), start=three[0], end=three[2], centre=centre, axis=axes, angle=angle)
+    again = path_geometry.points(arc, np.zeros(9, np.int64), np.linspace(0, 1, 9))
     np.testing.assert_allclose(again, points, atol=1e-12)
-    length = np.hypot(3.0 * turn, 0.2 * turn)
-    assert arcs_out.lengths(three[0], three[2], arcs, axes, np.zeros(1, int))[0] == pytest.approx(length)
+    assert path_geometry.lengths(arc)[0] == pytest.approx(np.hypot(3.0 * turn, 0.2 * turn))
     assert arcs_out.through(*three, axes, np.array([-turn]), 1e-4)[1].all()  # the middle lies on the other way round
 
 
@@ -49,10 +48,7 @@ def test_what_hardly_bends_is_a_line():
     z = np.array([[0.0, 0, 1]])
     start, end = np.zeros((1, 3)), np.array([[10.0, 0, 1]])
     flat, wrong = arcs_out.through(start, np.array([[5.0, 1e-5, 0.5]]), end, z, np.array([-1.0]), 2e-4)
-    assert not flat.on.any() and not wrong.any()
-    assert arcs_out.lengths(start, end, flat, z, np.zeros(1, int))[0] == pytest.approx(np.sqrt(101.0))
-    assert arcs_out.along(start, end, flat, z, np.array([0.5])) == pytest.approx(np.array([[5.0, 0, 0.5]]))
-    assert Arcs.none(2).take(np.array([1])).on.tolist() == [False]
+    assert np.isnan(flat).all() and not wrong.any()
 
 
 def test_a_floor_of_the_bend_divides_what_does_not_bend():
@@ -98,7 +94,7 @@ ARCS = {
 @pytest.mark.parametrize("name", ARCS)
 def test_arcs_come_out_as_fewer_arcs_within_the_tolerance(name):
     straight, result, after = check(HEAD + ARCS[name] + "M2\n")
-    bent = result.rows.arcs.on
+    bent = result.rows.bent
     assert bent.any() and len(result.rows.w) <= 0.5 * len(straight.rows.w)
     assert len(result.written.data) < len(straight.written.data)
     # What the text says is what was put through the model.
