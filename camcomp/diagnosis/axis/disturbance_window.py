@@ -11,6 +11,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.diagnosis.model.window import TRAVEL_BINS, best_window
+from camcomp.diagnosis.statistics.folds import PARTS
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Floats, Ints
 
@@ -32,7 +33,7 @@ class Window:
 def find_window(
     values: Mapping[int, Floats], beside: Mapping[int, Floats], times: Mapping[int, Floats], floor: float
 ) -> tuple[Window, Floats] | None:
-    """The window of forces (n,) N by run that explains most, where it is as long and as large as a push.
+    """The window of forces (n,) N by run that explains most, where it is as long and as large as a push, and so throughout.
 
     beside: columns (n, k) that are fitted to the same runs, so that friction and inertia have no part in how long a push lasts.
     With what all else leaves of the window's run (n,), the push still in it.
@@ -54,7 +55,8 @@ def find_window(
     shift, rest = _alone(rests[k], bases[k], first, last)
     if abs(shift) < LEAST_SIZE * floor or times[k][last - 1] - times[k][first] < SHORTEST_S:
         return None
-    return Window(k, first, last, shift), rest
+    parts = [float(np.mean(part)) for part in np.array_split(rest[first:last], min(PARTS, last - first))]
+    return (Window(k, first, last, shift), rest) if all(abs(p - shift) < 0.5 * abs(shift) for p in parts) else None
 
 
 def _projected(

@@ -29,6 +29,13 @@ def test_a_push_above_the_wander_of_a_zero_lasts_from_the_middle_of_its_rise_to_
         assert abs(best[0].first - 1500) <= 1 and abs(best[0].last - 2000) <= 1
 
 
+def test_a_force_that_fades_is_no_push():
+    time = 1e-3 * np.arange(4000)
+    force = NOISE * np.random.default_rng(0).standard_normal(4000)
+    force[1500:] += FORCE * np.exp(-(time[1500:] - time[1500]) / 0.3)
+    assert find_window({0: force}, {0: np.sin(3.0 * time)[:, None]}, {0: time}, NOISE) is None
+
+
 @pytest.mark.parametrize("begin", [4000, pytest.param(4020, marks=pytest.mark.campaign)])
 def test_a_push_that_begins_among_lost_rows_is_not_known_to_better(begin):
     rng = np.random.default_rng(begin)
