@@ -52,110 +52,90 @@ class Matching:
         """Lengths (m,) mm of the moves."""
         return path_geometry.lengths(self.path)
 
+    @cached_property
+    def _walked(self) -> Floats:
+        return np.concatenate(([0.0], np.cumsum(self.step)))
+
     def match(self, *, foreign: bool) -> tuple[Ints, Ints, int]:
         """Moves [first, last) that belong to every piece (p,), and the number of joining lines.
 
         foreign: another model put them there. Raises CheckFailed CC604 when the path is not one of these pieces.
         """
-        if not foreign:
-            try:
-                first, last, joins, off = self._as_expected()
-            except CheckFailed:
-                if not self.stamped:
-                    raise
-            else:
-                if off <= SURE_MM or not self.stamped:
-                    return first, last, joins
-        return self._by_course() or self._as_expected()[:3]
+        try:
+            if not foreign:
+                found = self._search(as_expected=True)
+                off = sizes(self.path.end[found[1] - 1] - self.expected)
+                if off.max(initial=0.0) <= SURE_MM or not self.stamped:
+                    return found
+        except CheckFailed:
+            if not self.stamped:
+                raise
+        try:
+            return self._search(as_expected=False)
+        except CheckFailed:
+            return self._search(as_expected=True)
 
-    def limit(self, piece: int) -> float:
-        """Length, mm, that the moves of a piece may have together."""
-        return float(1.3 * max(self.track.length[piece], self.reach[piece]) + NEAR_MM)
+    def _search(self, *, as_expected: bool) -> tuple[Ints, Ints, int]:
+        """`match` with joining lines where the model has them and every piece as it fits best, or else by the course of the moves.
 
-    def _as_expected(self) -> tuple[Ints, Ints, int, float]:
-        """The match if joining lines are where the model has them, and how far off the worst end is, mm."""
-        track, expected, layout, end = self.track, self.expected, self.layout, self.path.end
-        n, moves = len(track.motion), len(end)
-        first, last = np.zeros(n, np.int64), np.zeros(n, np.int64)
-        at = joins = 0
-        worst = 0.0
-        for i in range(n):
-            if self.stamped and layout.leading[i]:
-                at, joins = at + 1, joins + 1
-            left = n - i - 1
-            stop, walked = at, 0.0
-            best, found = np.inf, -1
-            limit = self.limit(i)
-            while stop < moves - left:
-                walked += self.step[stop]
-                if walked > limit and stop > at:
-                    break
-                off = float(np.linalg.norm(end[stop] - expected[i]))
-                score = off + 0.1 * min(abs(walked - track.length[i]), abs(walked - self.reach[i]))
-                if score < best - 1e-9:
-                    best, found = score, stop
-                stop += 1
-            if found < 0 or best > NEAR_MM + 0.1 * limit:
-                line = int(track.path.line[track.motion[i]])
-                raise CheckFailed("CC604", f"no moves that cut line {line} of the original are found")
-            first[i], last[i] = at, found + 1
-            worst = max(worst, float(np.linalg.norm(end[found] - expected[i])))
-            at = found + 1
-            if self.stamped and layout.trailing[i]:
-                at, joins = at + 1, joins + 1
-        if at != moves:
-            raise CheckFailed("CC604", f"{moves - at} moves at the end have no counterpart in the original")
-        return first, last, joins, worst
-
-    def _by_course(self) -> tuple[Ints, Ints, int] | None:
-        """The match whose moves go best along their pieces, with joining lines wherever feed lines can join; None: there is none."""
-        n, moves, step = len(self.track.motion), len(self.path), self.step
-        feeding = self.layout.corrected & (self.track.path.kind[self.track.motion] != RAPID)
+        By the course the moves go best along their pieces, with joining lines wherever feed lines can join.
+        """
+        n, moves, step, layout = len(self.track.motion), len(self.path), self.step, self.layout
+        feeding = layout.corrected & (self.track.path.kind[self.track.motion] != RAPID)
         joins = (self.path.kind != RAPID) & (step < NEAR_MM)
         ways = [_Way(0.0, 0.0, 0, 0, None)]
         for i in range(n):
             grown: dict[int, _Way] = {}
             room = moves - (n - i - 1)
+            leads, trails = [(0, 1) if feeding[i] else (0,)] * 2
+            if as_expected:
+                leads, trails = ((int(each[i] and self.stamped),) for each in (layout.leading, layout.trailing))
             for way in ways:
-                for lead in (0, 1) if feeding[i] else (0,):
+                for lead in leads:
                     begin = way.at + lead
                     if begin >= room or (lead and not joins[way.at]):
                         continue
-                    cost = way.cost + lead * JOINING * step[way.at]
-                    for stop, more, longer in self._ends(i, begin, room):
-                        for trail in (0, 1) if feeding[i] and stop + 1 < room else (0,):
-                            if trail and not joins[stop + 1]:
+                    for stop, longer in self._ends(i, begin, room, 1 if as_expected else ENDS):
+                        cost = way.cost + lead * JOINING * step[way.at]
+                        cost += 0.0 if as_expected else self._off_course(i, begin, stop)
+                        for trail in trails:
+                            if trail and not (stop + 1 < room and joins[stop + 1]):
                                 continue
-                            total = cost + more + (JOINING * step[stop + 1] if trail else 0.0)
+                            total = cost + (JOINING * step[stop + 1] if trail else 0.0)
                             behind = stop + 1 + trail
                             if behind not in grown or total < grown[behind].cost:
                                 count, stretch = way.joins + lead + trail, way.stretch + longer
                                 grown[behind] = _Way(total, stretch, behind, count, (way.bounds, begin, stop + 1))
+            if not grown:
+                line = int(self.track.path.line[self.track.motion[i]])
+                raise CheckFailed("CC604", f"no moves that cut line {line} of the original are found")
             ways = sorted(grown.values(), key=lambda each: each.cost + each.stretch)[:WAYS]
         whole = [way for way in ways if way.at == moves]
         if not whole:
-            return None
-        first, last = np.zeros(n, np.int64), np.zeros(n, np.int64)
+            left = moves - max(way.at for way in ways)
+            raise CheckFailed("CC604", f"{left} moves at the end have no counterpart in the original")
         best = min(whole, key=lambda each: each.cost)
-        bounds = best.bounds
+        first, last, bounds = np.zeros(n, np.int64), np.zeros(n, np.int64), best.bounds
         for i in range(n - 1, -1, -1):
             assert bounds is not None
             bounds, first[i], last[i] = bounds
         return first, last, best.joins
 
-    def _ends(self, i: int, begin: int, room: int) -> list[tuple[int, float, float]]:
-        """Last moves that piece i may have if it begins with move `begin`, what each of them costs, and the stretch, mm."""
-        path, track, limit = self.path, self.track, self.limit(i)
-        run = np.cumsum(self.step[begin:room])
-        run = run[: max(int(np.searchsorted(run, limit, side="right")), 1)]
-        off = sizes(path.end[begin : begin + len(run)] - self.expected[i])
+    def _ends(self, i: int, begin: int, room: int, most: int) -> list[tuple[int, float]]:
+        """Last moves that piece i may have if it begins with move `begin`, the likeliest first, and the stretch of each, mm."""
+        track, walked = self.track, self._walked
+        limit = 1.3 * max(track.length[i], self.reach[i]) + NEAR_MM  # of the moves of a piece together
+        stop = min(max(int(np.searchsorted(walked, walked[begin] + limit, side="right")) - 1, begin + 1), room)
+        run = walked[begin + 1 : stop + 1] - walked[begin]
         longer = np.minimum(np.abs(run - track.length[i]), np.abs(run - self.reach[i]))
-        off += 0.1 * longer
-        near = [int(k) for k in np.argsort(off, kind="stable")[:ENDS] if off[k] <= NEAR_MM + 0.1 * limit]
-        out = []
-        for k in near:
-            w = np.concatenate(([0.0], run[: k + 1] / max(float(run[k]), 1e-300)))
-            along = np.diff(track.points(np.full(len(w), i), w), axis=0)
-            made = path.end[begin : begin + k + 1] - path.start[begin : begin + k + 1]
-            out.append((begin + k, float(sizes(made - along).sum()), float(longer[k])))
-        return out
+        off = sizes(self.path.end[begin:stop] - self.expected[i]) + 0.1 * longer
+        near = np.argsort(off, kind="stable")[:most]
+        return [(begin + int(k), float(longer[k])) for k in near if off[k] <= NEAR_MM + 0.1 * limit]
+
+    def _off_course(self, i: int, begin: int, stop: int) -> float:
+        """By how much (mm) moves `begin` to `stop` go elsewhere than along piece i."""
+        walked = self._walked[begin : stop + 2] - self._walked[begin]
+        w = walked / max(float(walked[-1]), 1e-300)
+        along = np.diff(self.track.points(np.full(len(w), i), w), axis=0)
+        made = self.path.end[begin : stop + 1] - self.path.start[begin : stop + 1]
+        return float(sizes(made - along).sum())
