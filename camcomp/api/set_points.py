@@ -6,8 +6,7 @@ from typing import BinaryIO
 
 from camcomp.api.machine import Job
 from camcomp.compensation.report.tables import actuator_columns
-from camcomp.compensation.set_points.lines import AnswerWriter, Reader
-from camcomp.compensation.set_points.service import Tally, serve
+from camcomp.compensation.set_points.lines import AnswerWriter, Reader, Tally, serve
 from camcomp.compensation.set_points.stream import Stream
 
 __all__ = ["Stream", "Tally", "answer_lines"]

@@ -1,17 +1,25 @@
-"""Lines of set-points and of their answers, as CSV or JSON: one line in, one line out, whatever stands in it."""
+"""Lines of set-points and of their answers, as CSV or JSON: one line in, one line out, whatever stands in it.
+
+Every set-point is answered at once, and no mistake in one ends the stream.
+"""
 
 from __future__ import annotations
 
 import csv
+import gc
 import json
 import re
+from array import array
 from collections.abc import Sequence
 from math import isnan
-from typing import Any, NamedTuple
+from time import perf_counter_ns
+from typing import Any, BinaryIO, NamedTuple
 
+from camcomp.compensation.set_points.stream import Stream
 from camcomp.ground.bounds import LARGEST_NUMBER, number_of
-from camcomp.ground.errors import CamcompError, ConfigError
+from camcomp.ground.errors import CamcompError, CheckFailed, ConfigError
 
+LONGEST = 1 << 16  # bytes of a line; a set-point has about a hundred
 NEEDED = ("x_mm", "y_mm", "z_mm", "fx_N", "fy_N", "fz_N")
 TIME = "t_s"
 _NAMES = frozenset((*NEEDED, TIME))
@@ -44,8 +52,12 @@ class Reader:
         self._begun = False  # a row has been read
         self._started = False  # a line has come
         self._refusing = False  # a header could not be used
-        self._use([each.strip() for each in columns.split(",")] if columns is not None else [*NEEDED, TIME])
-        self._short = 6 if columns is None else self._count  # time may be left out where no columns are named
+        self.names = [*NEEDED, TIME] if columns is None else [each.strip() for each in columns.split(",")]
+        _check_names(self.names)
+        self._counts = {
+            len(self.names),
+            6 if columns is None else len(self.names),
+        }  # without names time may be left out
 
     def read(self, line: bytes) -> SetPoint | None:
         """The set-point of a line with its end; None for a header. Raises ConfigError CC270 for anything else."""
@@ -83,32 +95,23 @@ class Reader:
     def _header(self, names: list[str]) -> None:
         if not self._known:
             self._refusing = True
-            self._use(names)
-            self._short, self._known, self._refusing = self._count, True, False
+            _check_names(names)
+            self.names, self._counts, self._known, self._refusing = names, {len(names)}, True, False
         elif names != self.names:
             self._refusing = True
             raise ConfigError("CC270", f"a header of other columns than {','.join(self.names)}")
         elif self._begun:
             raise ConfigError("CC270", "a header behind the first row")
 
-    def _use(self, names: list[str]) -> None:
-        _check_names(names)
-        self.names = names
-        self._order = tuple(names.index(name) for name in NEEDED)
-        self._time = names.index(TIME) if TIME in names else None
-        self._count = len(names)
-
-    def _row(self, v: list[float]) -> SetPoint:
+    def _row(self, values: list[float]) -> SetPoint:
         if self._refusing:
             raise ConfigError(
                 "CC270", "the header above this line cannot be used, so the order of the columns is not known"
             )
-        if len(v) != self._count and len(v) != self._short:
-            raise ConfigError("CC270", f"{len(v)} columns, not {self._count}")
+        if len(values) not in self._counts:
+            raise ConfigError("CC270", f"{len(values)} columns, not {len(self.names)}")
         self._known = self._begun = True
-        a, b, c, d, e, f = self._order
-        time = v[self._time] if self._time is not None and self._time < len(v) else None
-        return _bounded((v[a], v[b], v[c]), (v[d], v[e], v[f]), time)
+        return _point(dict(zip(self.names, values, strict=False)))
 
 
 def _cells(text: str) -> list[str]:
@@ -129,14 +132,12 @@ def _from_json(text: str) -> SetPoint:
         pairs: list[tuple[str, Any]] = _JSON.decode(text)
     except (ValueError, RecursionError) as error:
         raise ConfigError("CC270", f"no JSON object: {error}") from None
-    data = dict(pairs)
     _check_names([name for name, _ in pairs])
     for name, value in pairs:
         if type(value) not in (float, int):
             raise ConfigError("CC270", f"{name} is not a number")
     try:
-        x, y, z, fx, fy, fz = (float(data[name]) for name in NEEDED)
-        return _bounded((x, y, z), (fx, fy, fz), float(data[TIME]) if TIME in data else None)
+        return _point({name: float(value) for name, value in pairs})
     except OverflowError:
         raise ConfigError("CC270", "a number is too large") from None
 
@@ -148,11 +149,13 @@ def _refuse_constant(word: str) -> float:
 _JSON = json.JSONDecoder(object_pairs_hook=list, parse_constant=_refuse_constant)
 
 
-def _bounded(tip: Triple, force: Triple, time: float | None) -> SetPoint:
-    size = sum(map(abs, tip)) + sum(map(abs, force))
+def _point(cells: dict[str, float]) -> SetPoint:
+    x, y, z, fx, fy, fz = (cells[name] for name in NEEDED)
+    time = cells.get(TIME)
+    size = abs(x) + abs(y) + abs(z) + abs(fx) + abs(fy) + abs(fz)
     if not (size <= LARGEST_NUMBER and (time is None or abs(time) <= LARGEST_NUMBER)):
         raise ConfigError("CC270", f"a number is larger than {LARGEST_NUMBER:g}")
-    return SetPoint(tip, force, time)
+    return SetPoint((x, y, z), (fx, fy, fz), time)
 
 
 def _check_names(names: Sequence[str]) -> None:
@@ -191,7 +194,8 @@ class AnswerWriter:
             more = "" if error is None else f', "error": "{error.rule}", "message": {json.dumps(error.message)}'
             return "{" + time + self._object % numbers + more + "}\n"
         time = "" if point.time is None else repr(point.time)
-        return f"{time},{self._row % numbers},{_cell(error)}\n"
+        told = "" if error is None else _quoted(f"{error.rule} {error.message}")
+        return f"{time},{self._row % numbers},{told}\n"
 
     def bad(self, line: int, rule: str, message: str, point: SetPoint | None = None) -> str:
         """Answer of a line that could not be read or solved. line: its number in the stream, from 1."""
@@ -204,10 +208,70 @@ class AnswerWriter:
         return ",".join((time, *given, *empty, _quoted(f"line {line}: {rule} {message}"))) + "\n"
 
 
-def _cell(error: CamcompError | None) -> str:
-    return "" if error is None else _quoted(f"{error.rule} {error.message}")
-
-
 def _quoted(text: str) -> str:
     printable = "".join(each if each.isprintable() else " " for each in text.replace('"', "'"))
     return '"' + " ".join(printable.split()) + '"'
+
+
+class Tally:
+    """Answered set-points and their computing times, counted per microsecond: a stream may last for days."""
+
+    def __init__(self) -> None:
+        self._bins = array("q", bytes(8 * 10_001))
+        self.count = 0
+        self.errors = 0
+
+    def add(self, nanoseconds: int) -> None:
+        """One more set-point that was answered."""
+        self._bins[min(nanoseconds // 1000, 10_000)] += 1
+        self.count += 1
+
+    def _within(self, share: float) -> int:
+        seen = 0
+        for microseconds, count in enumerate(self._bins):
+            seen += count
+            if seen >= share * self.count:
+                return microseconds + 1
+        return len(self._bins)
+
+    def text(self) -> str:
+        """Computing times of the set-points in words; empty without any."""
+        if not self.count:
+            return ""
+        return f"compute: half within {self._within(0.5)} us, 99.9 % within {self._within(0.999)} us; "
+
+
+def serve(stream: Stream, reader: Reader, writer: AnswerWriter, tally: Tally, source: BinaryIO, sink: BinaryIO) -> None:
+    """Answers until the input ends."""
+    sink.write(writer.header.encode())
+    sink.flush()
+    number = 0
+    gc.collect()
+    gc.freeze()  # what lives now lives to the end; the collector need not look at it in the middle of a set-point
+    while line := source.readline(LONGEST):
+        number += 1
+        began = perf_counter_ns()
+        point = None
+        try:
+            if len(line) == LONGEST and not line.endswith(b"\n"):
+                while (rest := source.readline(LONGEST)) and not rest.endswith(b"\n"):
+                    pass
+                raise ConfigError("CC270", f"the line is longer than {LONGEST} bytes")
+            point = reader.read(line)
+            if point is None:
+                sink.write(writer.columns(reader.names).encode())
+                sink.flush()
+                continue
+            solved = stream.correct(point.tip, point.force)
+            error = None
+            if solved.beyond:
+                error = CheckFailed("CC602", f"actuator {', '.join(solved.beyond)} leaves its travel")
+                tally.errors += 1
+            trios = zip(solved.nominal.tolist(), solved.actuators.tolist(), solved.drive.tolist(), strict=True)
+            answer = writer.good(point, [*solved.commanded.tolist(), *(each for trio in trios for each in trio)], error)
+            tally.add(perf_counter_ns() - began)
+        except CamcompError as wrong:
+            answer = writer.bad(number, wrong.rule, wrong.message, point)
+            tally.errors += 1
+        sink.write(answer.encode("utf-8", "backslashreplace"))
+        sink.flush()
