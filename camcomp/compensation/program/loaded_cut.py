@@ -76,7 +76,7 @@ def loaded_cut(job: Job, program: Program, step_mm: float = STEP_MM) -> LoadedCu
     for turn in range(ROUNDS):
         memory = memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds)
         with part(turn / ROUNDS, (turn + 1) / ROUNDS):
-            force, unrest = _lead(memory=memory, track=track, way=way, free=free, slope=slope, reach=reach)
+            force, unrest = _Leading(memory=memory, track=track, way=way, free=free, slope=slope, reach=reach).run()
         off = tips(force) - free - np.einsum("kij,kj->ki", slope, force)
         if np.abs(off).max(initial=0.0) < STILL_MM:
             break
@@ -191,56 +191,101 @@ def _runs(track: Track, feeds: Bools) -> Ints:
     return np.cumsum(begins)
 
 
-def _lead(
-    memory: StockMemory, track: Track, way: Way, free: Floats, slope: Floats, reach: float
-) -> tuple[Floats, Floats]:
-    """Leads the tip through the stock: forces (k, 3) N at the nodes, and what is left (mm) where they were sought.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Leading:
+    """A tip that is led through the stock; at nodes (k,) it lies at free + slope @ force."""
 
-    A force changes as the tool goes on, and it takes about as much way as the tool is bent: behind a sharp corner the tip
-    goes straight to where it is bent for the new direction, and so it does over runs shorter than `reach` between two
-    sharp corners, by which corrected lines are joined. Where such runs lead elsewhere, the tip first goes there.
-    """
-    n = len(way.piece)
-    tool = track.path.tool[track.motion[way.piece]]
-    force, unrest = np.zeros((n, 3)), list[float]()
-    at, begin, skipped = free[0] if n else np.zeros(3), 0.0, False
-    bend: list[tuple[float, Floats]] = []  # way and bend at the nodes of this run
-    for k in range(n):
-        before = force[max(k - 1, 0)]
-        if k == 0 or way.run[k] != way.run[k - 1]:
-            begin, goes_on = way.s[k], k > 0 and way.feeds[k - 1] and way.feeds[k]
-            rest = FARTHER * float(np.linalg.norm(at - way.told[k])) if goes_on else 0.0
-            short = goes_on and way.run_length[k] < reach
-            if skipped and not short and way.loads[k]:
-                there = (
-                    free[k]
-                    + slope[k]
-                    @ _at_rest(memory, track, way=way, k=k, free=free[k], slope=slope[k], start=before, bend=[])[0]
+    memory: StockMemory
+    track: Track
+    way: Way
+    free: Floats  # (k, 3) mm
+    slope: Floats  # (k, 3, 3) mm/N
+    reach: float  # mm
+
+    def run(self) -> tuple[Floats, Floats]:
+        """Lead the tip: forces (k, 3) N at the nodes, and the imbalance (mm) where they were sought.
+
+        A force changes as the tool goes on, and it takes about as much way as the tool is bent: behind a sharp corner the tip
+        goes straight to where it is bent for the new direction, and so it does over runs shorter than `reach` between two
+        sharp corners, by which corrected lines are joined. Where such runs lead elsewhere, the tip first goes there.
+        """
+        way, free, slope, n = self.way, self.free, self.slope, len(self.way.piece)
+        tool = self.track.path.tool[self.track.motion[way.piece]]
+        force, unrest = np.zeros((n, 3)), list[float]()
+        at, begin, skipped = free[0] if n else np.zeros(3), 0.0, False
+        bend: list[tuple[float, Floats]] = []  # way and bend at the nodes of this run
+        for k in range(n):
+            before = force[max(k - 1, 0)]
+            if k == 0 or way.run[k] != way.run[k - 1]:
+                begin, goes_on = way.s[k], k > 0 and way.feeds[k - 1] and way.feeds[k]
+                rest = FARTHER * float(np.linalg.norm(at - way.told[k])) if goes_on else 0.0
+                short = goes_on and way.run_length[k] < self.reach
+                if skipped and not short and way.loads[k]:
+                    there = free[k] + slope[k] @ self._at_rest(k, before, [])[0]
+                    if np.linalg.norm(there - at) > REAL * np.linalg.norm(
+                        way.told[k] - at
+                    ):  # not joined where it stood
+                        self.memory.take(at, there, int(tool[k]), self.reach)
+                        at, rest = there, 0.0
+                skipped = short
+                rest = np.inf if short else rest
+                bend = []
+            if way.s[k] - begin < rest or (bend and way.s[k] == bend[-1][0]):
+                force[k] = before
+                continue
+            if way.loads[k]:
+                force[k], left = self._at_rest(k, before, bend)
+                unrest.append(left)
+            elif way.feeds[k]:
+                force[k] = way.fixed[k]
+            tip = free[k] + slope[k] @ force[k]
+            if way.feeds[k]:
+                self.memory.take(at, tip, int(tool[k]), self.reach)
+            bend.append((way.s[k], tip - way.told[k]))
+            at = tip
+            if k % 256 == 0:
+                done(k / n)
+        return force, np.array(unrest)
+
+    def _at_rest(self, k: int, start: Floats, bend: list[tuple[float, Floats]]) -> tuple[Floats, float]:
+        """Solve force (3,) N and tip at node k together; return the force and the imbalance of the tip, mm.
+
+        The tool advances where its tip does: along the program's direction and as its bend changes.
+
+        Steps towards the force found are as long as the last two let hope (Aitken): where the tool begins to touch, the arc
+        grows with the square root of the way, and full steps would go to and fro for ever.
+        """
+        track, way, free, slope = self.track, self.way, self.free[k], self.slope[k]
+        piece, w = way.piece[k : k + 1], way.w[k : k + 1]
+        tool, force, share, before, behind = (
+            int(track.path.tool[track.motion[piece[0]]]),
+            start,
+            1.0,
+            None,
+            _behind(bend),
+        )
+        for _ in range(TRIES):
+            tip, direction = free + slope @ force, way.direction[k]
+            if behind is not None:
+                direction = direction + (tip - way.told[k] - behind[1]) / (way.s[k] - behind[0])
+                direction = direction / np.linalg.norm(direction)
+            depth, arcs = self.memory.meet(tip, direction, tool)
+            found = np.zeros(3)
+            if len(arcs.start):
+                found = way.fixed[k]
+                if not track.conditions.plunges:
+                    found = track.force_meeting(piece, w, direction[None], np.array([depth]), arcs)[0]
+            step = found - force
+            left = float(np.abs(slope @ step).max())
+            if left < REST_MM:
+                return found, 0.0
+            if before is not None:
+                change = step - before
+                share = float(
+                    np.clip(-share * (before @ change) / max(float(change @ change), 1e-30), LEAST_SHARE, 1.0)
                 )
-                if np.linalg.norm(there - at) > REAL * np.linalg.norm(way.told[k] - at):  # not joined where it stood
-                    memory.take(at, there, int(tool[k]), reach)
-                    at, rest = there, 0.0
-            skipped = short
-            rest = np.inf if short else rest
-            bend = []
-        if way.s[k] - begin < rest or (bend and way.s[k] == bend[-1][0]):
-            force[k] = before
-            continue
-        if way.loads[k]:
-            force[k], left = _at_rest(
-                memory, track, way=way, k=k, free=free[k], slope=slope[k], start=before, bend=bend
-            )
-            unrest.append(left)
-        elif way.feeds[k]:
-            force[k] = way.fixed[k]
-        tip = free[k] + slope[k] @ force[k]
-        if way.feeds[k]:
-            memory.take(at, tip, int(tool[k]), reach)
-        bend.append((way.s[k], tip - way.told[k]))
-        at = tip
-        if k % 256 == 0:
-            done(k / n)
-    return force, np.array(unrest)
+            force, before = force + share * step, step
+        return force, left
 
 
 def _behind(bend: list[tuple[float, Floats]]) -> tuple[float, Floats] | None:
@@ -251,46 +296,3 @@ def _behind(bend: list[tuple[float, Floats]]) -> tuple[float, Floats] | None:
             if each[0] <= far:
                 return each
     return None
-
-
-def _at_rest(
-    memory: StockMemory,
-    track: Track,
-    *,
-    way: Way,
-    k: int,
-    free: Floats,
-    slope: Floats,
-    start: Floats,
-    bend: list[tuple[float, Floats]],
-) -> tuple[Floats, float]:
-    """Solve force (3,) N and tip at node k together; return the force and the imbalance of the tip, mm.
-
-    The tool advances where its tip does: along the program's direction and as its bend changes.
-
-    Steps towards the force found are as long as the last two let hope (Aitken): where the tool begins to touch, the arc
-    grows with the square root of the way, and full steps would go to and fro for ever.
-    """
-    row = np.array([k])
-    tool, piece, w = int(track.path.tool[track.motion[way.piece[k]]]), way.piece[row], way.w[row]
-    force, share, before, behind = start, 1.0, None, _behind(bend)
-    for _ in range(TRIES):
-        tip, direction = free + slope @ force, way.direction[k]
-        if behind is not None:
-            direction = direction + (tip - way.told[k] - behind[1]) / (way.s[k] - behind[0])
-            direction = direction / np.linalg.norm(direction)
-        depth, arcs = memory.meet(tip, direction, tool)
-        found = np.zeros(3)
-        if len(arcs.start):
-            found = way.fixed[k]
-            if not track.conditions.plunges:
-                found = track.force_meeting(piece, w, direction[None], np.array([depth]), arcs)[0]
-        step = found - force
-        left = float(np.abs(slope @ step).max())
-        if left < REST_MM:
-            return found, 0.0
-        if before is not None:
-            change = step - before
-            share = float(np.clip(-share * (before @ change) / max(float(change @ change), 1e-30), LEAST_SHARE, 1.0))
-        force, before = force + share * step, step
-    return force, left
