@@ -9,6 +9,7 @@ import os
 import pickle
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +64,7 @@ def find_programs(paths: Sequence[str], output: Path) -> list[FoundProgram]:
                 raise FileError("CC500", f"cannot read {text}: no such file")
             base, files = path.parent, [path]
         else:
-            fixed = [part for part in path.parts[: _first_magic(path)]]
-            base = Path(*fixed) if fixed else Path()
+            base = Path(*takewhile(lambda part: not glob.has_magic(part), path.parts))
             files = [Path(each) for each in glob.glob(text, recursive=True)]
         for each in sorted(files):
             place = Path(os.path.realpath(each.parent)) / each.name
@@ -74,14 +74,9 @@ def find_programs(paths: Sequence[str], output: Path) -> list[FoundProgram]:
         raise ConfigError("CC271", f"no NC program in {', '.join(paths)}")
     places: dict[Path, Path] = {}
     for source, relative in found.items():
-        if relative in places:
-            raise FileError("CC502", f"{places[relative]} and {source} would both become {output / relative}")
-        places[relative] = source
+        if (other := places.setdefault(relative, source)) != source:
+            raise FileError("CC502", f"{other} and {source} would both become {output / relative}")
     return [FoundProgram(source, relative) for relative, source in sorted(places.items())]
-
-
-def _first_magic(path: Path) -> int:
-    return next(i for i, part in enumerate(path.parts) if glob.has_magic(part))
 
 
 def key_of_config(plan: Plan) -> str:

@@ -16,11 +16,10 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from camcomp.compensation.placing.postures import STATED, start_postures
 from camcomp.compensation.program.compensate import compensate
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, progress
-from camcomp.ground.datatypes import RAPID, Path
+from camcomp.ground.datatypes import RAPID, Floats, Path
 from camcomp.ground.errors import CamcompError
 from camcomp.ground.records import dataclass, replace
 from camcomp.ground.result import Result, Size
@@ -29,12 +28,16 @@ from camcomp.model.config.robot import PrismaticActuator
 from camcomp.model.config.spec import Config
 from camcomp.model.control import program_of
 from camcomp.model.job import Job
+from camcomp.model.statics.arm import arm_of, end_pose
+from camcomp.model.statics.closedform import closed_form
 
 HALF_TABLE_MM = 500.0  # of the square that is searched by default, where no travel is shorter
 MOST_MOTIONS = 400  # of a program that is judged whole
 SAMPLED = 60  # motions of a longer one
 ROUNDS = 2  # of refinement
 EQUAL_DECIMALS = 2  # of um: placements that differ by less are equal
+STATED = "stated"
+_PARTS = ("shoulder", "elbow", "wrist")  # the order of the branches of the closed form
 
 
 class Placement(Result):
@@ -201,3 +204,34 @@ def _motion(path: Path, k: int) -> Iterator[str]:
     for word, point in (("G0", start), ("G1", end)):
         feed = f" F{path.feed[k]:.3f}" if word == "G1" else ""
         yield f"{word} X{point[0]:.5f} Y{point[1]:.5f} Z{point[2]:.5f}{feed}"
+
+
+def start_postures(job: Job) -> dict[str, dict[str, float]]:
+    """Start angles (deg) by posture and joint that hold the platform at its start pose, within limits; empty for machines without the closed form of an arm."""
+    arm = arm_of(job.machine.nominal)
+    solver = closed_form(arm) if arm is not None else None
+    if arm is None or solver is None:
+        return {}
+    branches = solver.all(*end_pose(arm, arm.start))
+    own = np.array(list(product((0, 1), repeat=len(_PARTS))))[solver.branch]
+    found = {}
+    for branch, side in zip(branches, product((0, 1), repeat=len(_PARTS)), strict=True):
+        parts = [part for part, a, b in zip(_PARTS, own, side, strict=True) if a != b]
+        if parts and branch is not None and (angles := _within_limits(job, np.degrees(branch))) is not None:
+            found[f"{' and '.join(parts)} flipped"] = dict(
+                zip(job.config.robot.actuators, angles.round(9).tolist(), strict=True)
+            )
+    return found
+
+
+def _within_limits(job: Job, angles: Floats) -> Floats | None:
+    """Angles (6,) deg plus whole turns, the smallest within limits; None if a joint is out of its limits."""
+    out = []
+    for angle, each in zip(angles, job.config.robot.actuators.values(), strict=True):
+        low, high = each.limits or (-np.pi, np.pi)
+        turns = angle + 360.0 * np.arange(-2, 3)
+        inside = turns[(turns >= np.degrees(low)) & (turns <= np.degrees(high))]
+        if not len(inside):
+            return None
+        out.append(inside[np.argmin(np.abs(inside))])
+    return np.array(out)

@@ -9,8 +9,7 @@ import pytest
 from camcomp.api.compensation import compensate
 from camcomp.api.machine import Job, load_machine
 from camcomp.api.placing import MachineTable, place
-from camcomp.compensation.placing.postures import start_postures
-from camcomp.compensation.placing.search import placed
+from camcomp.compensation.placing.search import placed, start_postures
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 
