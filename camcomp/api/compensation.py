@@ -77,9 +77,7 @@ class CompensatedProgram:
 
     def paths_file(self) -> bytes:
         """The five trajectories as CSV."""
-        from camcomp.compensation.program.trajectories import trajectories
-
-        return tables.paths_csv(self.outcome, trajectories(self.outcome, self.machine))
+        return tables.paths_csv(self.outcome, self.machine)
 
     def report(self, inputs: Sequence[Input] = ()) -> bytes:
         """One HTML page with plots. Raises ConfigError CC216 without the plot library."""
@@ -146,7 +144,7 @@ def compensate_file(
     Raises:
         FileError: an output cannot be written; and the errors of `compensate`.
     """
-    from camcomp.compensation.file_to_file import CorrectionSettings, FileOutcome, OutputPaths, compensate_to_files
+    from camcomp.compensation.file_to_file import CorrectionSettings, FileOutcome, compensate_to_files
 
     machine = load_machine(*configs)
     if report:
@@ -170,8 +168,10 @@ def compensate_file(
                 version=__version__,
                 arcs=arcs,
             )
-            names = OutputPaths(output, joints, summary)
-            return compensate_to_files(file, name, own, asked, paths=names, inputs=(program, *configs), dry_run=dry_run)
+            return compensate_to_files(
+                file, name, own, asked, program=output, joints=joints, summary=summary, inputs=(program, *configs),
+                dry_run=dry_run,
+            )  # fmt: skip
         data = file.read()
     from camcomp.model.control import program_of
 

@@ -23,19 +23,6 @@ MOST_EXACT = 1 << 20  # bytes up to which a program is solved point by point whe
 
 
 @dataclass(frozen=True)
-class OutputPaths:
-    """Names of the outputs; "-" is standard output, None omits the output."""
-
-    program: str | None
-    joints: str | None
-    summary: str | None
-
-    def names(self) -> list[str]:
-        """Names of the outputs that are written."""
-        return [each for each in (self.program, self.joints, self.summary) if each is not None]
-
-
-@dataclass(frozen=True)
 class FileOutcome:
     """Figures of a corrected program, its failed checks (rule id and text), and the size of every output by name."""
 
@@ -65,16 +52,16 @@ def is_for_pieces(source: BinaryIO, job: Job, settings: CorrectionSettings) -> b
     return not job.causes or (simple and not has_memory(job.causes))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class OpenOutputs:
-    """Files that a corrected program and its joint table go to; None omits one. table: name of the joint table."""
+    """Files for a corrected program and its joint table; None omits one. table: name of the joint table."""
 
     program: BinaryIO | None
     joints: BinaryIO | None
     table: str | None
 
     def clear(self) -> None:
-        """Forget what was written."""
+        """Empty the files."""
         for file in filter(None, (self.program, self.joints)):
             file.seek(0)
             file.truncate()
@@ -139,18 +126,17 @@ def _in_pieces(
 
 
 def compensate_to_files(
-    source: BinaryIO, name: str, job: Job, settings: CorrectionSettings, *, paths: OutputPaths, inputs: Sequence[str], dry_run: bool
+    source: BinaryIO, name: str, job: Job, settings: CorrectionSettings, *, program: str | None, joints: str | None,
+    summary: str | None, inputs: Sequence[str], dry_run: bool,
 ) -> FileOutcome:  # fmt: skip
-    """`compensate_into` named files, all of them or none."""
-    names = paths.names()
+    """`compensate_into` named files: all of them are written, or none is. "-" is standard output, None omits an output."""
+    names = [each for each in (program, joints, summary) if each is not None]
     with writing(names, inputs=inputs, keep=not dry_run) as files:
-        program, joints = (None if each is None else files[each] for each in (paths.program, paths.joints))
-        totals = compensate_into(
-            source, name, job, settings, OpenOutputs(program=program, joints=joints, table=paths.joints)
-        )
+        text, rows = (files[each] if each else None for each in (program, joints))
+        totals = compensate_into(source, name, job, settings, OpenOutputs(text, rows, table=joints))
         figures = totals.summary()
-        if paths.summary:
-            files[paths.summary].write(figures.to_json())
+        if summary:
+            files[summary].write(figures.to_json())
         return FileOutcome(
             figures, totals.failed_checks(settings.tolerance_um), {each: files[each].tell() for each in names}
         )

@@ -42,7 +42,6 @@ class TipField:
         self._on_force = any(each.moves_force for each in self.inputs)
         self._fit: _Fit | None = None
         self._known, self._values = np.zeros((0, 6)), np.zeros((0, 0))  # what fits rest on
-        self.solved = 0
 
     def moves(self, commanded: Floats, force: Floats, changes: Sequence[Sequence[Floats]]) -> TipMoves:
         """Moves at commanded tips (n, 3), program frame, under forces (n, 3) N, machine frame.
@@ -148,7 +147,6 @@ class TipField:
     def _tips(self, machine: Machine, told: Floats, force: Floats, name: str) -> Floats:
         """Loaded tips (n, 3), program frame."""
         state = solve(machine, FREE, told, force=force, check=False)
-        self.solved += len(told)
         if state.status.any():
             raise unsolved(self._job, name)
         return self._job.frame.to_program(state.tip)

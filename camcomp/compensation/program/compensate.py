@@ -11,43 +11,39 @@ from functools import partial
 import numpy as np
 
 from camcomp.compensation.bands.outcome import Bands, BandTotals
-from camcomp.compensation.program import arcs_out
-from camcomp.compensation.program.arcs_out import Bend
-from camcomp.compensation.program.chords import COARSE_MM, Nodes, second_derivative, trial_nodes
+from camcomp.compensation.bands.tip_field import tip_field_of
+from camcomp.compensation.program import division
 from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of, times_of
+from camcomp.compensation.program.division import COARSE_MM, Bend, Nodes, second_derivative, trial_nodes
 from camcomp.compensation.program.judged_points import (
+    Division,
     JudgedPoints,
     Seen,
     commanded_travel,
-    judged_points,
     see,
     see_original,
     whole_pose,
 )
-from camcomp.compensation.program.line_ends import pieces_between
-from camcomp.compensation.program.load_turns import load_turns
+from camcomp.compensation.program.line_ends import cut_at, cut_at_knots, pieces_between
 from camcomp.compensation.program.moves import (
     WITHIN_RAPID,
     chord_budget,
     corrected_pieces,
     error_goals,
     refuse_unsolved,
-    travel_of,
     without_shared_ends,
 )
-from camcomp.compensation.program.orienting import MOST_TILT_RAD, Orienting, aim_along, refuse_unfollowed
-from camcomp.compensation.program.policy import shares_of
+from camcomp.compensation.program.orienting import MOST_TILT_RAD, Orienting, refuse_unfollowed
+from camcomp.compensation.program.play import cut_at_reversals, load_turns, turns_warning
 from camcomp.compensation.program.posture import check_posture
+from camcomp.compensation.program.programmed import Programmed
 from camcomp.compensation.program.result import Interpolation
-from camcomp.compensation.program.reversals import cut_at_reversals
-from camcomp.compensation.program.table_knots import cut_at_knots
-from camcomp.compensation.program.uncertainty import Uncertainty
+from camcomp.compensation.program.uncertainty import shares_of, tip_moves
 from camcomp.compensation.program.under_control import (
     UnderControl,
     may_pay_apart,
     rests,
     stays_apart,
-    under_control,
 )
 from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
@@ -100,14 +96,8 @@ class Compensated:
     missed: Floats  # (k, 3) mm of `after` without what a policy leaves on purpose
     orienting: Orienting | None = None  # how the program states the orientation of the tool; None: it does not
     tilt_after: Floats | None = None  # (k,) rad of the loaded platform where the tip is judged
-    fraction: Floats | None = None  # (N,) of the motion at every end point
+    programmed_words: Floats | None = None  # (N, 3) of the program's orientation at every end point; None: it has none
     interpolated: Interpolation | None = None  # None: every point was solved exactly
-
-    @property
-    def programmed_words(self) -> Floats:
-        """Words (N, 3) of the program's orientation at every end point; only in programs with orientation."""
-        assert self.fraction is not None and self.orienting is not None
-        return self.orienting.words(self.program.path, self.rows.motion, self.fraction)
 
     @property
     def lines(self) -> Ints:
@@ -145,19 +135,6 @@ def compensate(
     return found
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Division:
-    """Pieces (p,) divided once, written, and put through the full model at judged points (k,)."""
-
-    rows: CorrectedRows
-    written: Rewritten
-    points: JudgedPoints
-    commanded: Floats  # (k, 3) mm, of the written program
-    after: Seen
-    missed: Floats  # (k, 3) mm of the error without what a policy leaves on purpose
-    worst: Floats  # (p,) mm, largest of these
-
-
 @dataclass(eq=False, kw_only=True)
 class _Correction:
     """One program to be corrected: its track of pieces (p,), and the trial points from which they are divided."""
@@ -179,12 +156,14 @@ class _Correction:
         if self.orienting is not None:
             refuse_unfollowed(job, self.method, self.part)
         self.turns = load_turns(job, base)
-        track, turning = cut_at_reversals(job, cut_at_knots(job, self.turns.cut(base), spacing), spacing)
+        turned = cut_at(base, [(i, at) for i, *ends in self.turns for at in ends])
+        track, turning = cut_at_reversals(job, cut_at_knots(job, turned, spacing), spacing)
         self.shares = shares_of(job, base)
         if self.shares is not None:
             track, of = self.shares.divided(self.shares.with_jumps(track))
             turning = turning[of]
-        self.track, self.pushed = track, pieces_between(base, track, self.turns.spans)
+        self.asked = Programmed(program, job, track, self.shares, self.orienting)
+        self.track, self.pushed = track, pieces_between(base, track, self.turns)
         self.corrected = corrected_pieces(program.path, track)
         self.feeding = self.corrected & (program.path.kind[track.motion] != RAPID)
         if self.part is not None:
@@ -221,37 +200,30 @@ class _Correction:
 
     def _aim(self, nodes: Nodes) -> _Aimed:
         """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
-        job, track, orienting, on = self.job, self.track, self.orienting, np.flatnonzero(self.corrected[nodes.piece])
+        asked, track, on = self.asked, self.track, np.flatnonzero(self.corrected[nodes.piece])
         piece, w, of = nodes.piece[on], nodes.w[on], np.arange(len(on))
-        if orienting is None:
+        if asked.orienting is None:
             piece, w, of = without_shared_ends(track, piece, w)
-        asked = of
-        if job.causes:  # drives remember their turns within rapids
+        points = of
+        if self.job.causes:  # drives remember their turns within rapids
             rapids = np.flatnonzero(self.corrected & (track.path.kind[track.motion] == RAPID) & (track.length > 0.0))
             between, at = np.repeat(rapids, len(WITHIN_RAPID)), np.tile(WITHIN_RAPID, len(rapids))
             order = np.lexsort((np.concatenate((w, at)), np.concatenate((piece, between))))
-            asked = np.argsort(order, kind="stable")[: len(piece)][of]
+            points = np.argsort(order, kind="stable")[: len(piece)][of]
             piece, w = np.concatenate((piece, between))[order], np.concatenate((w, at))[order]
-        target, travel = track.points(piece, w), travel_of(job, track, piece, w)
-        result, turned = aim_along(
-            job, track, orienting, target, travel, piece=piece, w=w, method=self.method, tips_only=True
-        )
-        words = np.zeros((len(nodes.w), 3))
-        if orienting is not None:
-            words = orienting.programmed(track, nodes.piece, nodes.w)
-            words[on] = turned[asked]
+        result, turned = asked.aim(piece, w, method=self.method, tips_only=True)
+        words = asked.words(nodes.piece, nodes.w)
+        words[on] = turned[points]
         status = result.status
         if self.part is not None:  # the others are refused as parts of their own
             own = (track.motion[piece] >= self.part.first) & (track.motion[piece] < self.part.last)
             status = np.where(own, status, 0)
-        refuse_unsolved(self.program, track, piece, target, status)
-        aimed = out = result.commanded.take(asked, axis=0)
+        refuse_unsolved(self.program, track, piece, track.points(piece, w), status)
+        aimed = out = result.commanded.take(points, axis=0)
         if len(on) < len(nodes.w):
             out = track.points(nodes.piece, nodes.w)
             out[on] = aimed
-        if self.shares is not None:
-            out = self.shares.taken(track, nodes.piece, nodes.w, track.points(nodes.piece, nodes.w), out)
-        return _Aimed(out, int(result.iterations[asked].max(initial=0)), words)
+        return _Aimed(asked.taken(nodes.piece, nodes.w, out), int(result.iterations[points].max(initial=0)), words)
 
     def _aim_at_others(self, nodes: Nodes) -> _Aimed:
         """`_aim`, where drives have no memory without those nodes that were trial points."""
@@ -269,7 +241,7 @@ class _Correction:
 
     # --- division ------------------------------------------------------------------------------------------------
 
-    def _divided(self, arcs: bool) -> _Division:
+    def _divided(self, arcs: bool) -> Division:
         """Divide finer and finer, until the written program keeps its goals or a finer division is no use."""
         bend, tolerance = self._bend(arcs)
         last, last_count = np.full(len(tolerance), np.inf), np.zeros(len(tolerance), np.int64)
@@ -323,7 +295,7 @@ class _Correction:
         (k, 3) of the orientation there. Turns off what cannot bend.
         """
         track = self.track
-        both, middle = arcs_out.middles(nodes, bend.use)
+        both, middle = division.middles(nodes, bend.use)
         aimed = self._aim_at_others(both)
         solved = aimed.commanded
         commanded = solved.compress(~middle, axis=0) + shift[:, :3]
@@ -331,9 +303,9 @@ class _Correction:
         to = np.flatnonzero((np.diff(nodes.piece, prepend=-1) == 0) & bend.use[nodes.piece])
         if len(to):
             motion = track.motion[nodes.piece[to]]
-            centre[to], wrong = arcs_out.through(
+            centre[to], wrong = division.through(
                 start=commanded[to - 1], middle=solved[middle], end=commanded[to], axis=track.path.axis[motion],
-                way=track.path.angle[motion], flat=arcs_out.FLATTEST * self.step,
+                way=track.path.angle[motion], flat=division.FLATTEST * self.step,
             )  # fmt: skip
             bend.use[nodes.piece[to[wrong]]] = False
         if self.orienting is None:
@@ -341,25 +313,22 @@ class _Correction:
         turned = shift[:, 3:] / self.orienting.length(1e-3 * self.tolerance_um)
         return commanded, centre, aimed.words[~middle] + turned
 
-    def _written(self, nodes: Nodes, commanded: Floats, centre: Floats, words: Floats | None) -> _Division:
+    def _written(self, nodes: Nodes, commanded: Floats, centre: Floats, words: Floats | None) -> Division:
         """The program written with commanded tips (k, 3) at nodes, and seen by the full model."""
-        job, track, part = self.job, self.track, self.part
+        asked, part = self.asked, self.part
         rows = corrected_rows(
-            self.program, job, track=track, nodes=nodes, commanded=commanded, kept=self.kept, centre=centre,
-            begins=part is None or part.first == 0, shares=self.shares, orienting=self.orienting, words=words,
+            asked, nodes, commanded=commanded, kept=self.kept, centre=centre, begins=part is None or part.first == 0, words=words
         )  # fmt: skip
         written = self._rewritten(rows)
-        points = judged_points(job, track, rows, self.feeding & ~self.pushed)
+        points = JudgedPoints(asked, rows, self.feeding & ~self.pushed)
         curves = rows.curves(self.program.path, written.end, written.centre)
         told = path_geometry.points(curves, points.row, points.fraction)
-        after = see(job, points, told, self.orienting, written.words)
-        missed = after.error
-        if self.shares is not None:
-            missed = missed - self.shares.left(job, track, points.piece, points.w, points.travel, before=points.before)
+        after = see(asked, points, told, written.words)
+        missed = after.error - asked.accepted(points.piece, points.w, points.travel, points.before)
         size = np.where(after.status == 0, sizes(missed), np.inf)
         if after.tilt is not None:
             size = np.maximum(size, np.nan_to_num(after.tilt) * self.goal[points.piece] / MOST_TILT_RAD)
-        return _Division(
+        return Division(
             rows=rows, written=written, points=points, commanded=told, after=after, missed=missed,
             worst=largest_of_groups(size[points.judged], points.piece[points.judged], len(self.goal)),
         )  # fmt: skip
@@ -387,7 +356,9 @@ class _Correction:
             still = np.intersect1d(still, program.path.line[track.motion[self.feeding]])
         written, control = self._controlled(found)
         line, nominal = program.path.line[rows.motion], before.state.rho_nominal
-        warnings = self.turns.warning() + check_posture(program, job, line, job.frame.to_machine(rows.target), nominal)
+        warnings = turns_warning(self.turns) + check_posture(
+            program, job, line, job.frame.to_machine(rows.target), nominal
+        )
         state = after.state
         if self.method != "linear" and rows.words is None:  # words of orientation say what the control makes of them
             state = whole_pose(job, points, found.commanded, rows.corrected, state)
@@ -401,17 +372,16 @@ class _Correction:
             moved=not self.kept[self.feeding].all(), engaged=track.engaged,
             bands=self._bands(found, before, written), missed=found.missed.take(judged, axis=0),
             orienting=self.orienting, tilt_after=None if after.tilt is None else after.tilt[judged],
-            fraction=track.u(rows.piece, rows.w),
+            programmed_words=None if self.orienting is None else self.asked.words(rows.piece, rows.w),
         )  # fmt: skip
 
-    def _controlled(self, found: _Division) -> tuple[Rewritten, UnderControl]:
+    def _controlled(self, found: Division) -> tuple[Rewritten, UnderControl]:
         """The program with the stops and path modes that its controller needs, and what that makes of it."""
         rows, rest = found.rows, rests(self.program, found.rows, self.tolerance_um, self.part)
         written = self._rewritten(rows, rest) if rest.any() else found.written
         planned = partial(
-            under_control, self.program, self.job, rows=rows, written=written, points=found.points,
-            told=found.commanded, missed=found.missed, rest=rest, tolerance_um=self.tolerance_um,
-        )  # fmt: skip
+            UnderControl, self.asked, replace(found, written=written), rest=rest, tolerance_um=self.tolerance_um
+        )
         control = planned()
         apart = stays_apart(self.program, rows, self.part)
         if apart.any() and control.stated and may_pay_apart(control, rows, self.part, self.tolerance_um):
@@ -420,24 +390,23 @@ class _Correction:
                 return self._rewritten(rows, rest, apart), other
         return written, control
 
-    def _bands(self, found: _Division, before: Seen, written: Rewritten) -> Bands | None:
+    def _bands(self, found: Division, before: Seen, written: Rewritten) -> Bands | None:
         """Bands of the end points; None where every number of the config is exact."""
         job, rows, points = self.job, found.rows, found.points
         if not job.config.uncertain:
             return None
-        uncertainty = Uncertainty(job, self.track)
         at = np.arange(len(points.row)) if job.causes else np.flatnonzero(points.end)
         free = (rows.joining & (rows.w > 0.0))[points.row]
         travel = commanded_travel(points, self.orienting, written.words)
-        moves = uncertainty.moves(
-            points.piece[at], points.w[at], commanded=found.commanded[at], travel=travel.take(at), free=free[at],
-            base=(found.after.error + points.target)[at], before=points.before,
+        moves = tip_moves(
+            job, self.track, points.piece[at], points.w[at], commanded=found.commanded[at], travel=travel.take(at),
+            base=(found.after.error + points.target)[at], free=free[at], before=points.before,
         )  # fmt: skip
         ends, counted = moves.take(np.flatnonzero(points.end[at])), np.flatnonzero(points.judged)
         share = np.ones(len(rows.w))
         if self.shares is not None:
             share = self.shares.of_ends(self.track, rows.piece, rows.w, rows.joining)
-        totals, row = BandTotals(uncertainty.inputs), points.row[counted]
+        totals, row = BandTotals(tip_field_of(job).inputs), points.row[counted]
         totals.add(found.after.error[counted], ends.take(row), share[row])
         return Bands(
             before=before.error[points.end], after=found.after.error[points.end], moves=ends, share=share,

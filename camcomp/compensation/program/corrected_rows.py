@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.compensation.program.arcs_out import sweeps
-from camcomp.compensation.program.chords import Nodes
-from camcomp.compensation.program.moves import refuse_unsolved, row_layout, travel_of
-from camcomp.compensation.program.orienting import Orienting, aim_along
+from camcomp.compensation.program.division import Nodes, sweeps
+from camcomp.compensation.program.moves import refuse_unsolved, row_layout
+from camcomp.compensation.program.programmed import Programmed
 from camcomp.gcode.output import Output
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry
@@ -19,9 +16,6 @@ from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import sizes
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
-
-if TYPE_CHECKING:
-    from camcomp.compensation.program.policy import Shares
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -59,37 +53,34 @@ class CorrectedRows:
 
 
 def corrected_rows(
-    program: Program,
-    job: Job,
-    track: Track,
+    asked: Programmed,
     nodes: Nodes,
     *,
     commanded: Floats,
     kept: Bools,
     centre: Floats,
     begins: bool,
-    shares: Shares | None = None,
-    orienting: Orienting | None = None,
-    words: Floats | None = None,
+    words: Floats | None,
 ) -> CorrectedRows:
     """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps.
 
     centre (k, 3): of the moves that lead to the nodes as arcs, NaN for lines. words (k, 3): of the orientation at the nodes,
     where there are some.
     """
+    program, track = asked.program, asked.track
     path = program.path
     k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
     kind = path.kind[track.motion]
     start, stop = (commanded.take(at, axis=0) for at in (nodes.first[:-1], nodes.first[1:] - 1))
     before = path.start[:1] if begins else start[:1]
     step = sizes(start - np.concatenate((before, stop[:-1])))
-    layout = row_layout(path, track, step, program.step_mm(job.config.control.resolution_mm))
+    layout = row_layout(path, track, step, program.step_mm(asked.job.config.control.resolution_mm))
     keep = np.flatnonzero((k > 0) | layout.leading[nodes.piece])
     extra = np.flatnonzero(layout.trailing)
     piece = np.concatenate((nodes.piece[keep], extra))
     w = np.concatenate((nodes.w[keep], np.ones(len(extra))))
     joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
-    free, turned = _behind_cuts(program, job, track, extra, shares=shares, orienting=orienting)
+    free, turned = _behind_cuts(asked, extra)
     end = np.concatenate((commanded.take(keep, axis=0), free))
     centre = np.concatenate((centre.take(keep, axis=0), np.full((len(extra), 3), np.nan)))
     order = np.arange(len(piece))
@@ -111,9 +102,9 @@ def corrected_rows(
     engagement = (
         np.broadcast_to(np.nan, (len(piece), 2)) if track.engaged is None else np.column_stack(track.sizes(piece, w))
     )
-    if orienting is not None and words is not None:
+    if words is not None:
         words = np.concatenate((words[keep], turned))[order]
-        words[whole] = orienting.programmed(track, piece, w)[whole]
+        words[whole] = asked.words(piece, w)[whole]
     angle = np.where(rows_kind == ARC, path.angle[motion], 0.0)
     rows = CorrectedRows(
         piece=piece, motion=motion, w=w, kind=rows_kind, joining=joining, corrected=~passed, force=force, target=target,
@@ -123,21 +114,16 @@ def corrected_rows(
     return replace(rows, angle=curves.angle, feed=_feeds(program, track, rows, path_geometry.lengths(curves)))
 
 
-def _behind_cuts(
-    program: Program, job: Job, track: Track, piece: Ints, *, shares: Shares | None, orienting: Orienting | None
-) -> tuple[Floats, Floats]:
+def _behind_cuts(asked: Programmed, piece: Ints) -> tuple[Floats, Floats]:
     """Commanded tips (e, 3) mm behind the cuts of pieces (e,), without their force, and words (e, 3) of the orientation."""
-    one = np.ones(len(piece))
+    one, track = np.ones(len(piece)), asked.track
     target, none = track.points(piece, one), np.zeros((len(piece), 3))
     if not len(piece):
         return target, none
-    unloaded = replace(travel_of(job, track, piece, one), force=none)
-    result, turned = aim_along(job, track, orienting, target, unloaded, piece=piece, w=one, tips_only=True)
-    refuse_unsolved(program, track, piece, target, result.status)
-    if shares is None:
-        return result.commanded, turned
+    result, turned = asked.aim(piece, one, replace(asked.travel(piece, one), force=none), tips_only=True)
+    refuse_unsolved(asked.program, track, piece, target, result.status)
     behind = np.minimum(piece + 1, len(track.motion) - 1)  # where the next piece begins, with its share
-    return shares.taken(track, behind, np.zeros(len(piece)), target, result.commanded), turned
+    return asked.taken(behind, np.zeros(len(piece)), result.commanded, target), turned
 
 
 def _feeds(program: Program, track: Track, rows: CorrectedRows, commanded: Floats) -> Floats:

@@ -2,46 +2,58 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from camcomp.compensation.program.corrected_rows import CorrectedRows
-from camcomp.compensation.program.moves import WITHIN_RAPID, travel_of
+from camcomp.compensation.program.moves import WITHIN_RAPID
 from camcomp.compensation.program.orienting import Orienting
+from camcomp.compensation.program.programmed import Programmed
+from camcomp.gcode.output import Rewritten
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.records import dataclass, fields, replace
 from camcomp.ground.vectors import largest_of_groups, sizes
-from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_pose, respond
 from camcomp.model.statics.target import Correction
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
 class JudgedPoints:
-    """Where a corrected program is looked at, in the order of travel.
+    """Points (k,) at which a corrected program is looked at, in the order of travel.
 
-    End points, and between them the middles of lines and the quarters of arcs.
+    End points (N,) of its rows, and between them the middles of lines and the quarters of arcs.
     """
 
-    row: Ints  # (k,) end point that the point belongs to
-    fraction: Floats  # (k,) of the move to it, 1 at its end
-    piece: Ints
-    w: Floats
-    target: Floats  # (k, 3) mm programmed tip
-    travel: Travel
-    judged: Bools  # (k,) counted in before and after: feed motions, no joining lines
-    before: Floats | None  # (3,) where the first move starts, if that is known
-    near: Any = None  # response of a machine without effects that is interpolated, around the targets
-
-    @cached_property
-    def end(self) -> Bools:
-        """Which ones are end points."""
-        out: Bools = self.fraction == 1.0
-        return out
+    def __init__(self, asked: Programmed, rows: CorrectedRows, feeding: Bools) -> None:
+        """Feeding (p,): pieces on which points between end points are looked at."""
+        job, track, n = asked.job, asked.track, len(rows.piece)
+        cut = feeding[rows.piece] & ~rows.joining
+        begins = np.concatenate(([True], rows.piece[1:] != rows.piece[:-1])) | np.concatenate(
+            ([True], rows.joining[:-1])
+        )
+        start = np.where(begins, 0.0, np.concatenate(([0.0], rows.w[:-1])))
+        inner = np.flatnonzero(cut & (track.length[rows.piece] > 0.0))
+        bent = inner[rows.bent[inner]]
+        rapid = np.flatnonzero((rows.kind == RAPID) & rows.corrected) if job.causes else inner[:0]
+        row = np.concatenate((np.arange(n), inner, bent, bent, np.repeat(rapid, len(WITHIN_RAPID))))
+        fraction = np.repeat([1.0, 0.5, 0.25, 0.75], [n, len(inner), len(bent), len(bent)])
+        fraction = np.concatenate((fraction, np.tile(WITHIN_RAPID, len(rapid))))
+        order = np.argsort(row + 0.5 * fraction, kind="stable")
+        self.row = row = row[order]  # end point that the point belongs to
+        self.fraction = fraction = fraction[order]  # of the move to it, 1 at its end
+        self.end = end = fraction == 1.0
+        self.piece = piece = rows.piece[row]
+        self.w = np.where(end, rows.w[row], start[row] + fraction * (rows.w - start)[row])
+        self.target, self.travel = track.points(piece, self.w), asked.travel(piece, self.w)
+        self.travel.force[end] = job.frame.vectors(rows.force)  # joining lines know better
+        self.judged = cut[row]  # counted in before and after: feed motions, no joining lines
+        self.before = track.path.start[0] if n and track.path.known[0] else None  # (3,) where the first move starts
+        self.near: Any = None  # response of a machine without effects that is interpolated, around the targets
+        answers = job.real_machine.answers
+        if answers is not None and not job.causes and self.travel.rotation is None:
+            self.near = answers.near(job.frame.to_machine(self.target), self.travel.force, end)
 
     def sags(self, error: Floats, pieces: int) -> Floats:
         """How far (mm) in each piece (pieces,) errors (k, 3) at the middles of lines lie off the mean of those at their ends."""
@@ -50,36 +62,6 @@ class JudgedPoints:
         middle, before, behind = (error.take(each, axis=0) for each in (at, end[row - 1], end[row]))
         sag = sizes(middle - 0.5 * (before + behind))
         return largest_of_groups(sag, self.piece[at], pieces)
-
-
-def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -> JudgedPoints:
-    """End points of the rows, and points between them on `feeding` pieces (p,)."""
-    n = len(rows.piece)
-    cut = feeding[rows.piece] & ~rows.joining
-    begins = np.concatenate(([True], rows.piece[1:] != rows.piece[:-1])) | np.concatenate(([True], rows.joining[:-1]))
-    start = np.where(begins, 0.0, np.concatenate(([0.0], rows.w[:-1])))
-    inner = np.flatnonzero(cut & (track.length[rows.piece] > 0.0))
-    bent = inner[rows.bent[inner]]
-    rapid = np.flatnonzero((rows.kind == RAPID) & rows.corrected) if job.causes else inner[:0]
-    row = np.concatenate((np.arange(n), inner, bent, bent, np.repeat(rapid, len(WITHIN_RAPID))))
-    fraction = np.repeat([1.0, 0.5, 0.25, 0.75], [n, len(inner), len(bent), len(bent)])
-    fraction = np.concatenate((fraction, np.tile(WITHIN_RAPID, len(rapid))))
-    order = np.argsort(row + 0.5 * fraction, kind="stable")
-    row, fraction = row[order], fraction[order]
-    end = fraction == 1.0
-    piece = rows.piece[row]
-    w = np.where(end, rows.w[row], start[row] + fraction * (rows.w - start)[row])
-    travel = travel_of(job, track, piece, w)
-    force = travel.force
-    force[end] = job.frame.vectors(rows.force)  # joining lines know better
-    travel = replace(travel, force=force)
-    before = track.path.start[0] if n and track.path.known[0] else None
-    target, near, answers = track.points(piece, w), None, job.real_machine.answers
-    if answers is not None and not job.causes and travel.rotation is None:
-        near = answers.near(job.frame.to_machine(target), travel.force, end)
-    return JudgedPoints(
-        row=row, fraction=fraction, piece=piece, w=w, target=target, travel=travel, judged=cut[row], before=before, near=near,
-    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,10 +78,22 @@ class Seen:
     tilt: Floats | None = None  # (k,) rad of the loaded platform against the programmed orientation, where looked at
 
 
-def see(
-    job: Job, points: JudgedPoints, told: Floats, orienting: Orienting | None = None, words: Floats | None = None
-) -> Seen:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Division:
+    """Pieces (p,) divided once, written, and put through the full model at judged points (k,)."""
+
+    rows: CorrectedRows
+    written: Rewritten
+    points: JudgedPoints
+    commanded: Floats  # (k, 3) mm, of the written program
+    after: Seen
+    missed: Floats  # (k, 3) mm of the error without what a policy leaves on purpose
+    worst: Floats  # (p,) mm, largest of these
+
+
+def see(asked: Programmed, points: JudgedPoints, told: Floats, words: Floats | None = None) -> Seen:
     """The loaded machine at commanded points (k, 3) mm, program frame; words (N, 3): of the orientation at end points."""
+    job, orienting = asked.job, asked.orienting
     if points.near is not None:  # of machines that do not turn the tool
         commanded = job.frame.to_machine(told)
         state, tip = points.near.state(commanded), job.frame.to_program(points.near.tips(commanded))
@@ -108,10 +102,7 @@ def see(
     masses_at = points.target if job.causes or words is not None else None  # masses move with the target
     tip, state = respond(job, told, travel, masses_at, before=points.before)
     if orienting is not None and words is not None and travel.rotation is not None:
-        programmed = points.travel.rotation
-        if programmed is None:
-            programmed = np.broadcast_to(job.machine.nominal.held_rotation, (len(points.row), 3, 3))
-        tilt = orienting.tilt(travel.rotation, state, programmed)
+        tilt = orienting.tilt(travel.rotation, state, orienting.requested(points.travel))
     return _seen(points, tip, state, tilt)
 
 

@@ -1,4 +1,8 @@
-"""Places inside the pieces of a track at which a line has to end: points at which to look for them, and the track cut there."""
+"""Places inside the pieces of a track at which a line has to end: points at which to look for them, and the track cut there.
+
+The correction has a corner where an axis passes a row of its error table, and when something begins or ends that acts for
+a while.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from camcomp.compensation.program.chords import COARSE_MM, trial_nodes
-from camcomp.compensation.program.moves import corrected_pieces
+from camcomp.compensation.program.division import COARSE_MM, trial_nodes
+from camcomp.compensation.program.moves import corrected_pieces, travel_of
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
+from camcomp.model.effect import Cause
+from camcomp.model.error_table.table import ErrorTable
+from camcomp.model.job import Job
+from camcomp.model.statics.solve import inverse
 
 LEAST = 1e-6  # of a piece: places nearer to each other or to its ends are one
 
@@ -42,3 +50,49 @@ def pieces_between(track: Track, divided: Track, spans: Iterable[Span]) -> Bools
         low, high = track.u(np.array([i, i]), np.array(ends))
         out |= (divided.motion == track.motion[i]) & (low < middle) & (middle < high)
     return out
+
+
+def cut_at_knots(job: Job, track: Track, spacing: float) -> Track:
+    """The track cut where an axis with an error table passes a row of it, and at the instants that effects name.
+
+    spacing: distance of the points, mm, at which the axes are looked at; between them they move straight.
+    """
+    tables = [
+        (cause, cause.values["table"]) for cause in job.causes if isinstance(cause.values.get("table"), ErrorTable)
+    ]
+    instants = [knot for cause in job.causes for knot in _instants(cause)]
+    if not (tables or instants):
+        return track
+    piece, w = points_along(track, spacing)
+    tip = job.frame.to_machine(track.points(piece, w))
+    machine = job.real_machine
+    reference = tip - machine.nominal.held_rotation @ machine.nominal.tool
+    actuators = inverse(machine, tip)
+    within = piece[1:] == piece[:-1]
+    passed: list[tuple[Floats, Iterable[float]]] = []
+    for cause, table in tables:
+        named = np.flatnonzero(cause.which(machine.actuators))
+        x = actuators[:, named[0]] if len(named) else reference[:, "XYZ".index(str(cause.target)[2])]
+        passed.append((x, table.position.tolist()))
+    if instants:
+        passed.append((travel_of(job, track, piece, w).time, instants))
+    cuts: set[Place] = set()
+    for x, knots in passed:
+        for knot in knots:
+            row, share = _crossings(x - knot, within)
+            cuts.update(zip(piece[row].tolist(), (w[row] + share * np.diff(w)[row]).tolist(), strict=True))
+    return cut_at(track, cuts)
+
+
+def _instants(cause: Cause) -> list[float]:
+    """Times, s, of a temporary effect: begin, end of its rise, begin of its fall, end."""
+    ends = [cause.values[p.name] for p in cause.effect.PARAMETERS if p.placed]
+    rise = getattr(cause.effect, "RISE_S", 0.0)
+    return [] if len(ends) != 2 else [ends[0], ends[0] + rise, ends[1] - rise, ends[1]]
+
+
+def _crossings(x: Floats, within: Bools) -> tuple[np.ndarray, Floats]:
+    """Rows after which x (n,) passes zero before the next row, and at which share of the way."""
+    a, b = x[:-1], x[1:]
+    row = np.flatnonzero(within & ((a < 0.0) != (b < 0.0)) & np.isfinite(a) & np.isfinite(b))
+    return row, a[row] / (a[row] - b[row])

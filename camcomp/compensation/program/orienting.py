@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from camcomp.compensation.program.chords import Nodes
+from camcomp.compensation.program.division import Nodes
 from camcomp.gcode.output import Part
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Bools, Floats, Ints, Path
@@ -78,32 +78,34 @@ class Orienting:
         solved = exact.status == 0
         words = near.copy()
         words[solved] = platform_words(self.job, self.form, exact.rotation[solved], near[solved])
-        found = aim_at(self.job, target, _told(travel, self.platform(words)), "newton")
+        found = aim_at(self.job, target, self.told(travel, words), "newton")
         for _ in range(EFFECT_PASSES if self.job.causes else 0):
             turned = self._held_back(target, travel, found, words)
             if turned is None:
                 break
             words = turned
-            found = aim_at(self.job, target, _told(travel, self.platform(words)), "newton")
+            found = aim_at(self.job, target, self.told(travel, words), "newton")
         return found, words
 
     def _held_back(self, target: Floats, travel: Travel, found: Correction, words: Floats) -> Floats | None:
         """Words (n, 3) that cancel the tilt by effects in drives and structure; None where the tilt is negligible."""
-        told, requested = self.platform(words), travel.rotation
-        if requested is None:
-            requested = np.broadcast_to(self.job.machine.nominal.held_rotation, told.shape)
-        _, state = respond(self.job.correctable, found.commanded, _told(travel, told), target)
-        on = np.flatnonzero(state.status == 0)
+        told, requested = self.platform(words), self.requested(travel)
+        _, state = respond(self.job.correctable, found.commanded, replace(travel, rotation=told), target)
         if not np.nan_to_num(self.tilt(told, state, requested)).max(initial=0.0) > 0.5 * TILT_RAD:
             return None
-        loaded = np.array([exp_rotation(each) for each in state.tilt[on]]).reshape(-1, 3, 3) @ told[on]
+        on, loaded = _loaded(told, state)
         out = words.copy()
         out[on] = platform_words(self.job, self.form, requested[on] @ loaded.transpose(0, 2, 1) @ told[on], words[on])
         return out
 
     def told(self, travel: Travel, words: Floats) -> Travel:
         """The travel with the orientation that words (n, 3) say."""
-        return _told(travel, self.platform(words))
+        return replace(travel, rotation=self.platform(words))
+
+    def requested(self, travel: Travel) -> Floats:
+        """Orientations (n, 3, 3) of the platform that a travel asks for, machine frame."""
+        held = np.broadcast_to(self.job.machine.nominal.held_rotation, (len(travel.force), 3, 3))
+        return held if travel.rotation is None else travel.rotation
 
     def tilt(self, told: Floats, state: Correction, requested: Floats) -> Floats:
         """Angles (k,) rad of the loaded platform to the programmed orientations (k, 3, 3); NaN without a solution.
@@ -111,8 +113,7 @@ class Orienting:
         Of the tool's axis alone where words say no more.
         """
         out = np.full(len(told), np.nan)
-        on = np.flatnonzero(state.status == 0)
-        loaded = np.array([exp_rotation(each) for each in state.tilt[on]]).reshape(-1, 3, 3) @ told[on]
+        on, loaded = _loaded(told, state)
         if self.form == VECTOR:
             one, other = loaded[:, :, 2], requested[on][:, :, 2]
             sine = sizes(np.cross(one, other))
@@ -138,19 +139,6 @@ class Orienting:
         return between(self.form, start, ends[row], fraction)
 
 
-def aim_along(
-    job: Job, track: Track, orienting: Orienting | None, target: Floats, travel: Travel, *, piece: Ints, w: Floats,
-    method: str = "newton", tips_only: bool = False,
-) -> tuple[Correction, Floats]:  # fmt: skip
-    """Commands for targets (k, 3), which lie at fractions w (k,) of pieces (k,), and words (k, 3) of the orientation.
-
-    The words are zero where orienting is None.
-    """
-    if orienting is None:
-        return aim_at(job, target, travel, method, tips_only=tips_only), np.zeros((len(w), 3))
-    return orienting.aim(target, travel, orienting.programmed(track, piece, w))
-
-
 def refuse_unfollowed(job: Job, method: str, part: Part | None) -> None:
     """Raises ConfigError where a program with orientation asks for more than is done with one."""
     if method != "newton" or part is not None:
@@ -166,5 +154,7 @@ def refuse_unfollowed(job: Job, method: str, part: Part | None) -> None:
         )
 
 
-def _told(travel: Travel, rotation: Floats) -> Travel:
-    return replace(travel, rotation=rotation)
+def _loaded(told: Floats, state: Correction) -> tuple[Ints, Floats]:
+    """Solved points (j,), and orientations (j, 3, 3) of the loaded platform there."""
+    on = np.flatnonzero(state.status == 0)
+    return on, np.array([exp_rotation(each) for each in state.tilt[on]]).reshape(-1, 3, 3) @ told[on]

@@ -27,7 +27,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.orientation import angles_of
 from camcomp.ground.records import dataclass
 from camcomp.ground.source_lines import MOST_LINES, named_lines
-from camcomp.ground.vectors import sizes
+from camcomp.ground.vectors import distinct, sizes
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.cutting.assumed import ForceDoubts
 from camcomp.model.cutting.spindle import spindle_warning
@@ -174,18 +174,16 @@ class Totals:
             parts.append(bands.columns(with_share=self.job.config.compensation.policy != "full")[own])
         if self.job.config.workpiece.stock is not None:
             parts.append(result.rows.engagement[own])
-        if result.orienting is not None and result.written.words is not None:
-            both = (result.programmed_words[own], result.written.words[own])
-            parts += [angles_of(result.orienting.form, each) for each in both]
+        if result.orienting is not None:
+            both = (result.programmed_words, result.written.words)
+            parts += [angles_of(result.orienting.form, each[own]) for each in both if each is not None]
         return np.column_stack(parts) if parts else None
 
     def _add_beyond(self, rows: JointTableRows) -> None:
         """Note the lines on which actuators leave their travel."""
         for a, (low, high) in enumerate(self.job.machine.limits):
-            over = np.flatnonzero((rows.joints[:, a] < low) | (rows.joints[:, a] > high))
-            if len(over) and len(self._beyond[a]) <= MOST_LINES:
-                lines = np.unique(rows.line[over])[: MOST_LINES + 1]
-                self._beyond[a] = sorted({*self._beyond[a], *lines.tolist()})[: MOST_LINES + 1]
+            over = rows.line[(rows.joints[:, a] < low) | (rows.joints[:, a] > high)]
+            self._beyond[a] = sorted({*self._beyond[a], *distinct(over)})[: MOST_LINES + 1]
 
     def summary(self) -> Summary:
         """The figures of the program."""

@@ -15,11 +15,11 @@ import numpy as np
 from camcomp.compensation.program.control_account import ControlAccount, FarOff, PointsOnMoves
 from camcomp.compensation.program.result import CycleTime
 from camcomp.gcode.dialect import Dialect
-from camcomp.gcode.output import Part, Rewritten
+from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode, numbered
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
-from camcomp.ground.records import dataclass, replace
+from camcomp.ground.records import replace
 from camcomp.ground.vectors import largest, sizes
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job
@@ -28,7 +28,8 @@ from camcomp.model.trajectory.plan import ControlPlan, plan_of
 
 if TYPE_CHECKING:
     from camcomp.compensation.program.corrected_rows import CorrectedRows
-    from camcomp.compensation.program.judged_points import JudgedPoints
+    from camcomp.compensation.program.judged_points import Division
+    from camcomp.compensation.program.programmed import Programmed
 
 LOST_TIME = 1.02  # factor of the cycle time from which a faster way is looked for
 
@@ -49,23 +50,37 @@ def control_warnings(
     if all(each.stated for each in modes):
         mode = mode_name(modes)
         out += at_joins.warning(mode, " next to joining lines") + elsewhere.warning(mode, "")
-    if said := ", ".join(mode.apart.name for mode in distinct(apart)):
+    if said := ", ".join(mode.apart.name for mode in apart):
         out.append(f"{said} is written around the cuts: the controller does not merge lines there; nothing to do")
     return out
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
 class UnderControl:
     """Execution times and contour errors of a program under its controller, planned when they are asked for."""
 
-    programmed: ToolMoves
-    written: ToolMoves
-    limits: ControlLimits
-    tolerance_mm: float
-    modes: tuple[PathMode, ...]  # of the cuts, in the order in which they come
-    points: PointsOnMoves  # (k,) those of `after`
-    rest: Bools  # (N,) end points at which the control rests because of a joining line
-    apart: bool = False  # lines are kept from being made one
+    def __init__(
+        self, asked: Programmed, found: Division, *, rest: Bools, tolerance_um: float, apart: Bools | None = None
+    ) -> None:
+        """A corrected program. rest, apart (N,): forced stops of joining lines, lines that are kept from being made one.
+
+        tolerance_um: beyond which the controller is warned of.
+        """
+        program, job, rows, written, points = asked.program, asked.job, found.rows, found.written, found.points
+        self.programmed, self.limits = programmed_moves(program, job), limits_of(job.config)
+        self.rest, self.apart, self.tolerance_mm = rest, apart is not None, 1e-3 * tolerance_um
+        self.modes = modes_of(program)  # of the cuts, in the order in which they come
+        own = self.programmed.take(rows.motion)
+        self.written = replace(
+            own, **vars(rows.curves(program.path, written.end, written.centre)), feed=job.conditions.feeds(written.feed),
+            exact=own.exact | rest, waits=_waits(program, rows), merge=own.merge if apart is None else np.where(apart, 0.0, own.merge),
+        )  # fmt: skip
+        judged = np.flatnonzero(points.judged)
+        row = points.row[judged]
+        joining = np.concatenate((rows.joining, [False]))
+        self.points = PointsOnMoves(
+            move=row, commanded=found.commanded.take(judged, axis=0), error=found.missed.take(judged, axis=0),
+            line=program.path.line[rows.motion[row]], joined=joining[row - 1] | joining[row + 1],
+        )  # fmt: skip
 
     @cached_property
     def account(self) -> ControlAccount:
@@ -175,44 +190,6 @@ def moved_cuts(rows: CorrectedRows) -> Bools:
     return np.asarray((rows.kind != RAPID) & (largest(rows.end - rows.target) > 0.0))
 
 
-def under_control(
-    program: Program,
-    job: Job,
-    *,
-    rows: CorrectedRows,
-    written: Rewritten,
-    points: JudgedPoints,
-    told: Floats,
-    missed: Floats,
-    rest: Bools,
-    tolerance_um: float,
-    apart: Bools | None = None,
-) -> UnderControl:
-    """Plan a corrected program as its controller does.
-
-    told, missed (k, 3) mm: written program and its tip errors at the points. rest, apart (N,): forced stops, unmerged lines.
-    tolerance_um: beyond which the controller is warned of.
-    """
-    programmed = programmed_moves(program, job)
-    own = programmed.take(rows.motion)
-    moves = replace(
-        own, **vars(rows.curves(program.path, written.end, written.centre)), feed=job.conditions.feeds(written.feed),
-        exact=own.exact | rest, waits=_waits(program, rows), merge=own.merge if apart is None else np.where(apart, 0.0, own.merge),
-    )  # fmt: skip
-    judged = np.flatnonzero(points.judged)
-    row = points.row[judged]
-    joining = np.concatenate((rows.joining, [False]))
-    on_moves = PointsOnMoves(
-        move=row, commanded=told.take(judged, axis=0), error=missed.take(judged, axis=0),
-        line=program.path.line[rows.motion[row]], joined=joining[row - 1] | joining[row + 1],
-    )  # fmt: skip
-    return UnderControl(
-        programmed=programmed, written=moves, limits=limits_of(job.config),
-        tolerance_mm=1e-3 * tolerance_um, modes=modes_of(program), points=on_moves, rest=rest,
-        apart=apart is not None,
-    )  # fmt: skip
-
-
 def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um: float) -> bool:
     """Whether merging goes too far off on moves (n,) that cut, and they are as fast and nearer to their ends without it."""
 
@@ -231,12 +208,7 @@ def modes_of(program: Program) -> tuple[PathMode, ...]:
     """The modes of the cuts of a program, in the order in which they come."""
     known, which = numbered(program.modes)
     of = which[(program.path.kind != RAPID) & ~program.path.machine]
-    return distinct(known[k] for k in of[np.diff(of, prepend=-1) != 0])
-
-
-def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:
-    """Every mode once, in the order in which they come."""
-    return tuple(dict.fromkeys({id(each): each for each in modes}.values()))
+    return tuple(dict.fromkeys(known[k] for k in of[np.diff(of, prepend=-1) != 0]))
 
 
 def programmed_moves(program: Program, job: Job) -> ToolMoves:

@@ -13,20 +13,20 @@ from typing import Any
 import numpy as np
 
 from camcomp.compensation.bands.outcome import BandTotals, band_figures
-from camcomp.compensation.program.chords import trial_nodes
-from camcomp.compensation.program.load_turns import load_turns
+from camcomp.compensation.bands.tip_field import tip_field_of
+from camcomp.compensation.program.division import trial_nodes
 from camcomp.compensation.program.matching import Matching
 from camcomp.compensation.program.moves import (
     WITHIN_RAPID,
     corrected_pieces,
     refuse_unsolved,
     row_layout,
-    travel_of,
 )
-from camcomp.compensation.program.orienting import Orienting, aim_along
-from camcomp.compensation.program.policy import Shares, shares_of
+from camcomp.compensation.program.orienting import Orienting
+from camcomp.compensation.program.play import load_turns, passed_turns
+from camcomp.compensation.program.programmed import Programmed
 from camcomp.compensation.program.result import ErrorSum, LineResult, Verification
-from camcomp.compensation.program.uncertainty import Uncertainty
+from camcomp.compensation.program.uncertainty import shares_of, tip_moves
 from camcomp.compensation.program.under_control import of_text
 from camcomp.gcode.program import Program
 from camcomp.gcode.stamp import is_stamped, stamped_model
@@ -35,10 +35,9 @@ from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 from camcomp.ground.progress import part, steps
 from camcomp.ground.records import dataclass, field, replace
 from camcomp.ground.vectors import largest_of_groups, sizes
-from camcomp.model.cutting.track import Track, lay_track
+from camcomp.model.cutting.track import lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_at, respond
-from camcomp.model.statics.target import Correction
 
 PER_SECTION = 4  # points looked at within each straight move or section of an arc
 ARC_STEP = 0.1  # rad, section of an arc
@@ -82,8 +81,11 @@ class Verified:
 
 def verify(corrected: Program, original: Program, job: Job) -> Verified:
     """Residual of a corrected program. Raises CheckFailed CC604 when it is not one of this original."""
-    asked = _Programmed.of(original, job, corrected)
-    track, shares = asked.track, asked.shares
+    track = lay_track(original.path, job.conditions, job.engaged(original))
+    shares = shares_of(job, track)
+    if shares is not None:
+        track = shares.with_jumps(track)
+    asked = _Original(original, job, track, shares, Orienting.of(original, job, corrected))
     with part(0.0, 0.3, points=True):
         begin, expected = asked.commanded(0.0), asked.commanded(1.0)
     step = sizes(begin - np.concatenate((original.path.start[:1], expected[:-1])))
@@ -101,7 +103,7 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
         residual, w = points.matched(guess)
     # Rapids and starts are only there because drives remember them.
     judged = (points.f > 0.0) & (original.path.kind[track.motion[points.piece]] != RAPID)
-    judged &= ~load_turns(job, track).passed(points.piece, points.move, points.f, w)
+    judged &= ~passed_turns(load_turns(job, track), points.piece, points.move, points.f, w)
     error = points.gap(w)[judged]
     seen = points.counted()[judged]
     control = of_text(
@@ -144,29 +146,8 @@ def _samples(path: Path, pieces: Ints, first: Ints, last: Ints) -> tuple[Ints, I
     return np.repeat(piece, points), np.repeat(move, points), k / np.repeat(count, points)
 
 
-@dataclass(frozen=True, eq=False)
-class _Programmed:
+class _Original(Programmed):
     """The original program as it ought to be corrected; pieces (p,) of its track."""
-
-    program: Program
-    job: Job
-    track: Track
-    shares: Shares | None
-    orienting: Orienting | None
-
-    @classmethod
-    def of(cls, original: Program, job: Job, corrected: Program) -> _Programmed:
-        """The original of a corrected program."""
-        track = lay_track(original.path, job.conditions, job.engaged(original))
-        shares = shares_of(job, track)
-        if shares is not None:
-            track = shares.with_jumps(track)
-        return cls(original, job, track, shares, Orienting.of(original, job, corrected))
-
-    def aimed(self, piece: Ints, w: Floats) -> Correction:
-        """Commands for the programmed points, as compensate has them."""
-        target, travel = self.track.points(piece, w), travel_of(self.job, self.track, piece, w)
-        return aim_along(self.job, self.track, self.orienting, target, travel, piece=piece, w=w)[0]
 
     def commanded(self, w: float) -> Floats:
         """Commanded tip (p, 3) at fraction w of every piece, as compensate would have it."""
@@ -174,10 +155,10 @@ class _Programmed:
         pieces, at = np.arange(len(track.motion)), np.full(len(track.motion), w)
         out = track.points(pieces, at)
         on = np.flatnonzero(corrected_pieces(track.path, track))
-        result = self.aimed(on, at[on])
+        result, _ = self.aim(on, at[on])
         refuse_unsolved(self.program, track, on, out[on], result.status)
         out[on] = result.commanded
-        return out if self.shares is None else self.shares.taken(track, pieces, at, track.points(pieces, at), out)
+        return self.taken(pieces, at, out)
 
     def reach(self) -> Floats:
         """Length (p,) mm of the commanded path of every piece; where the correction is large, a small arc grows or shrinks."""
@@ -186,7 +167,7 @@ class _Programmed:
         nodes = trial_nodes(track.length, angle, corrected & (angle > 0.0))
         points = track.points(nodes.piece, nodes.w)
         on = corrected[nodes.piece]
-        points[on] = self.aimed(nodes.piece[on], nodes.w[on]).commanded
+        points[on] = self.aim(nodes.piece[on], nodes.w[on])[0].commanded
         step = sizes(np.diff(points, axis=0))
         inside = np.diff(nodes.piece) == 0
         return np.bincount(nodes.piece[1:][inside], step[inside], len(corrected)).astype(np.float64)
@@ -196,7 +177,7 @@ class _Programmed:
 class _Points:
     """Points (k,) looked at: fractions f of the moves of the corrected path that belong to a piece of the original."""
 
-    asked: _Programmed
+    asked: _Original
     path: Path
     piece: Ints
     move: Ints
@@ -205,7 +186,7 @@ class _Points:
     rotation: Floats | None  # (k, 3, 3) that the corrected program commands
 
     @classmethod
-    def of(cls, asked: _Programmed, path: Path, piece: Ints, move: Ints, f: Floats) -> _Points:
+    def of(cls, asked: _Original, path: Path, piece: Ints, move: Ints, f: Floats) -> _Points:
         """Points of the corrected path."""
         turning = asked.orienting
         rotation = None if turning is None else turning.platform(turning.words(path, move, f))
@@ -220,15 +201,15 @@ class _Points:
 
     def travel(self, w: Floats) -> Travel:
         """Travel at fractions w (k,) of the pieces, in the commanded orientation."""
-        travel = travel_of(self.asked.job, self.asked.track, self.piece, w)
+        travel = self.asked.travel(self.piece, w)
         return travel if self.rotation is None else replace(travel, rotation=self.rotation)
 
     def gap(self, w: Floats) -> Floats:
         """Vectors (k, 3) mm from fractions w (k,) of the pieces to the loaded tip; with a policy, to where it wants the tip."""
-        job, track, shares, travel = self.asked.job, self.asked.track, self.asked.shares, self.travel(w)
-        tip, _ = respond(job, self.commanded, travel)
-        gap: Floats = tip - track.points(self.piece, w)
-        return gap if shares is None else gap - shares.left(job, track, self.piece, w, travel)
+        asked, travel = self.asked, self.travel(w)
+        tip, _ = respond(asked.job, self.commanded, travel)
+        gap: Floats = tip - asked.track.points(self.piece, w) - asked.accepted(self.piece, w, travel)
+        return gap
 
     def fraction(self, reach: Floats) -> Floats:
         """First guess (k,) of the fraction of each piece: by the length of the path that ought to be commanded."""
@@ -247,7 +228,7 @@ class _Points:
         # One move goes evenly, and so do many where the correction is small against the piece.
         uneven = np.flatnonzero((moves > first) & (np.abs(reach - track.length)[:n] > UNEVEN * track.length[:n]))
         w = np.linspace(0.0, 1.0, ALONG + 1)
-        aimed = self.asked.aimed(np.repeat(uneven, len(w)), np.tile(w, len(uneven))).commanded
+        aimed = self.asked.aim(np.repeat(uneven, len(w)), np.tile(w, len(uneven)))[0].commanded
         for i, curve in zip(uneven, aimed.reshape(-1, len(w), 3), strict=True):
             way = np.concatenate(([0.0], np.cumsum(sizes(np.diff(curve, axis=0)))))
             on = piece == i
@@ -285,11 +266,10 @@ class _Points:
         The share that was taken may be another than the policy's by ALLOWED_SHARE: it rests on derivatives, and the rest
         of the distance on the solver.
         """
-        job, shares, travel = self.asked.job, self.asked.shares, self.travel(w)
-        target, beside = self.asked.track.points(self.piece, w), self.gap(w)
-        assert shares is not None
-        from_path = beside + shares.left(job, self.asked.track, self.piece, w, travel)
-        off = aim_at(job, target, travel, "newton").commanded - target
+        asked, travel = self.asked, self.travel(w)
+        target, beside = asked.track.points(self.piece, w), self.gap(w)
+        from_path = beside + asked.accepted(self.piece, w, travel)
+        off = aim_at(asked.job, target, travel, "newton").commanded - target
         size = np.maximum(sizes(off), 1e-12)
         along = np.einsum("ni,ni->n", beside, off) / size
         along = np.clip(along, -ALLOWED_SHARE * size, ALLOWED_SHARE * size)
@@ -298,14 +278,12 @@ class _Points:
     def expected_error(self, w: Floats, end: Bools) -> BandTotals:
         """What machines that may be leave at the ends (k,) of moves; the other points are only there because drives remember."""
         job, track, shares = self.asked.job, self.asked.track, self.asked.shares
-        uncertainty = Uncertainty(job, track)
         at = np.arange(len(end)) if job.causes else np.flatnonzero(end)
         piece, w, commanded, end, travel = self.piece[at], w[at], self.commanded[at], end[at], self.travel(w).take(at)
         tip, _ = respond(job, commanded, travel)
-        free = np.zeros(len(at), np.bool_)
-        moves = uncertainty.moves(piece, w, commanded=commanded, travel=travel, free=free, base=tip)
+        moves = tip_moves(job, track, piece, w, commanded=commanded, travel=travel, base=tip)
         taken = None if shares is None else shares.at(track, piece, w)[end]
-        totals = BandTotals(uncertainty.inputs)
+        totals = BandTotals(tip_field_of(job).inputs)
         totals.add((tip - track.points(piece, w))[end], moves.take(np.flatnonzero(end)), taken)
         return totals
 
@@ -313,7 +291,7 @@ class _Points:
         """Results by source line, of residuals (k,) and of what is missed (j,) at the judged points, mm."""
         job, track, program = self.asked.job, self.asked.track, self.asked.program
         piece, residual, vertex, w = self.piece[judged], residual[judged], self.f[judged] == 1.0, w[judged]
-        target, travel = track.points(piece[vertex], w[vertex]), travel_of(job, track, piece[vertex], w[vertex])
+        target, travel = track.points(piece[vertex], w[vertex]), self.asked.travel(piece[vertex], w[vertex])
         # solver error: model tip of the exact command of the nearest point, minus that point
         tip, _ = respond(job, aim_at(job, target, travel, "newton").commanded, travel)
         convergence = sizes(tip - target)

@@ -167,33 +167,31 @@ def figure_shift(drawn: DrawnPath) -> Figure:
     )  # fmt: skip
 
 
-def figures_actuators(drawn: DrawnPath, job: Job, *, drive: bool) -> list[Figure]:
-    """Changes of the actuators, or drive forces (seed Fig. 5), along the path; slides and hinges apart."""
-    out = []
-    for rotary in (False, True):
-        which = np.flatnonzero(job.machine.revolute == rotary)
-        if len(which):
-            out.append(_actuators(drawn, job.machine.actuators, which, rotary, drive))
-    return out
-
-
-def _actuators(drawn: DrawnPath, names: tuple[str, ...], which: Ints, rotary: bool, drive: bool) -> Figure:
-    values = (drawn.drive if drive else drawn.change)[:, which]
-    row = drawn.worst(np.abs(values).max(axis=1))
-    column = int(np.abs(values[row]).argmax())
-    if drive:
-        unit, what = ("N·m", "Drive torques") if rotary else ("N", "Drive forces")
-        note = "What the drive exerts on its carriage under load, positive along its positive direction"
-    else:
-        unit, what = ("mrad", "Changes of the hinges") if rotary else ("µm", "Changes of the slides")
-        note = "Commanded minus nominal actuator coordinate"
-    words = f"up to {brief(abs(values[row, column]))} {unit}, actuator {names[which[column]]} in line {drawn.line[row]}"
-    return Figure(
-        name=f"{'drive' if drive else 'change'}-{'hinges' if rotary else 'slides'}", title=f"{what} along the path",
-        caption=f"{note}: {words}.",
-        traces=drawn.curves([names[a] for a in which], values, 3),
-        layout=along_path(f"{'drive' if drive else 'change'} in {unit}"),
+def figures_actuators(drawn: DrawnPath, job: Job) -> list[Figure]:
+    """Changes of the actuators and drive forces (seed Fig. 5) along the path; slides and hinges apart."""
+    kinds = (
+        ("change", drawn.change, "Commanded minus nominal actuator coordinate",
+         (("slides", "µm", "Changes of the slides"), ("hinges", "mrad", "Changes of the hinges"))),
+        ("drive", drawn.drive, "What the drive exerts on its carriage under load, positive along its positive direction",
+         (("slides", "N", "Drive forces"), ("hinges", "N·m", "Drive torques"))),
     )  # fmt: skip
+    out = []
+    for kind, every, note, sorts in kinds:
+        for rotary, (sort, unit, what) in enumerate(sorts):
+            which = np.flatnonzero(job.machine.revolute == bool(rotary))
+            if not len(which):
+                continue
+            names, values = [job.machine.actuators[a] for a in which], every[:, which]
+            row = drawn.worst(np.abs(values).max(axis=1))
+            column = int(np.abs(values[row]).argmax())
+            words = (
+                f"up to {brief(abs(values[row, column]))} {unit}, actuator {names[column]} in line {drawn.line[row]}"
+            )
+            out.append(Figure(
+                name=f"{kind}-{sort}", title=f"{what} along the path", caption=f"{note}: {words}.",
+                traces=drawn.curves(names, values, 3), layout=along_path(f"{kind} in {unit}"),
+            ))  # fmt: skip
+    return out
 
 
 def figure_path(drawn: DrawnPath) -> Figure:

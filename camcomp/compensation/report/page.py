@@ -8,9 +8,8 @@ from pathlib import PurePath
 import numpy as np
 
 from camcomp.compensation.program.compensate import Compensated
-from camcomp.compensation.program.result import LineResult, Summary
+from camcomp.compensation.program.result import Summary
 from camcomp.compensation.program.totals import Totals
-from camcomp.compensation.program.trajectories import trajectories
 from camcomp.compensation.program.verify import Verified, verify
 from camcomp.compensation.report.band_section import band_section
 from camcomp.compensation.report.figures import (
@@ -23,6 +22,7 @@ from camcomp.compensation.report.figures import (
     figures_actuators,
 )
 from camcomp.compensation.report.machine_drawing import figure_machine
+from camcomp.compensation.report.tables import trajectories
 from camcomp.compensation.report.wall_drawing import wall_section
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats
@@ -156,24 +156,21 @@ def _travel(drawn: DrawnPath, rho: Floats, job: Job) -> list[tuple[str, str, str
 
 def _plots(result: Compensated, job: Job, drawn: DrawnPath, checked: Verified, tolerance_um: float) -> list[Section]:
     machine, found = figure_machine(result, job, drawn), trajectories(result, job)
-    paths, errors = (
-        [figure_trajectories(result, found), figure_path(drawn)],
-        [figure_error(drawn, tolerance_um), figure_shift(drawn)],
-    )
-    actuators = [*figures_actuators(drawn, job, drive=False), *figures_actuators(drawn, job, drive=True)]
+    paths = [figure_trajectories(result, found), figure_path(drawn)]
+    errors = [figure_error(drawn, tolerance_um), figure_shift(drawn)]
     budget = [figure_budget(checked, tolerance_um)] if checked.lines else []
     return [
         *([Section(name="drawing", title="The machine", figures=[machine])] if machine else []),
         Section(name="paths", title="Trajectories", figures=paths),
         Section(name="errors", title="Tip error and shift", figures=errors),
-        Section(name="actuators", title="Actuators", figures=actuators),
+        Section(name="actuators", title="Actuators", figures=figures_actuators(drawn, job)),
         Section(name="budget", title="Error budget", text=[BUDGET], figures=budget),
     ]
 
 
 def _lines(drawn: DrawnPath, job: Job, checked: Verified) -> Table:
     """Largest values per source line; of long programs those with the largest corrections."""
-    left = {each.line: each for each in checked.lines}
+    left = {each.line: each.residual_um for each in checked.lines}
     size = sizes(drawn.shift)
     shown = ~drawn.hidden
     numbers = np.unique(drawn.line[shown])
@@ -195,15 +192,11 @@ def _lines(drawn: DrawnPath, job: Job, checked: Verified) -> Table:
     rows = []
     for number, a, b in zip(numbers, first, last, strict=True):
         at = order[a:b]
-        values = [drawn.before[at].max(), _left(left.get(int(number)), drawn, at), size[at].max()]
+        values = [drawn.before[at].max(), left.get(int(number), float(drawn.after[at].max())), size[at].max()]
         for of in (drawn.change, drawn.drive):
             values += [column[np.abs(column).argmax()] for column in of[at].T]
         rows.append([(float(number), str(number)), (float(b - a), str(b - a)), *((float(v), brief(v)) for v in values)])
     return Table(caption, heads, rows, sortable=True)
-
-
-def _left(found: LineResult | None, drawn: DrawnPath, at: np.ndarray) -> float:
-    return found.residual_um if found else float(drawn.after[at].max())
 
 
 def _machine(job: Job) -> Section:

@@ -5,7 +5,7 @@ Parquet files have a fifth of the size of CSV and full precision, and need pyarr
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from io import BytesIO
 from typing import Any, BinaryIO
 
@@ -17,6 +17,7 @@ from camcomp.gcode.linear_rows import csv_rows
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError
 from camcomp.model.job import Job
+from camcomp.model.statics.target import settle
 
 PARQUET = ".parquet"
 DECIMALS = 6
@@ -123,8 +124,26 @@ def joint_bytes(result: Compensated, job: Job, name: str) -> bytes:
     return file.getvalue()
 
 
-def paths_csv(result: Compensated, curves: Mapping[str, Floats]) -> bytes:
-    """The five trajectories of the tool tip, program frame: seed Fig. 4."""
+def trajectories(result: Compensated, job: Job) -> dict[str, Floats]:
+    """The five trajectories of the tip of seed Fig. 4 (N, 3) mm, program frame, by name: as programmed, as the original program leads it, as commanded.
+
+    The original program on an imperfect machine without load, on a perfect one under the cutting force, and both.
+    """
+    target = job.frame.to_machine(result.rows.target)
+    force = job.frame.vectors(result.rows.force)
+    turning, words = result.orienting, result.programmed_words
+    rotation = None if turning is None or words is None else turning.platform(words)
+    alone, _ = settle(job.real_machine, target, np.zeros_like(force), rotation=rotation)
+    loaded, _ = settle(job.perfect_machine, target, force, rotation=rotation)
+    return {
+        "target": result.rows.target, "chain_error": job.frame.to_program(alone), "force": job.frame.to_program(loaded),
+        "both": result.uncorrected, "adjusted": result.written.end,
+    }  # fmt: skip
+
+
+def paths_csv(result: Compensated, job: Job) -> bytes:
+    """The trajectories as CSV."""
+    curves = trajectories(result, job)
     head = ["line", "s_mm"] + [f"{name}_{axis}_mm" for name in curves for axis in "xyz"]
     file = BytesIO()
     CsvFile(file, head).rows(result.lines, np.column_stack((result.s, *curves.values())))

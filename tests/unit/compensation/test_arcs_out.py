@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from camcomp.compensation.program import arcs_out
-from camcomp.compensation.program.chords import Nodes, divide
+from camcomp.compensation.program import division
 from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.program.division import Nodes, divide
 from camcomp.compensation.program.verify import verify
 from camcomp.gcode.interpret import read_program
 from camcomp.ground import path_geometry
@@ -32,22 +32,22 @@ def test_an_arc_is_found_from_three_of_its_points(axis, turn):
     at = 0.7 + turn * np.linspace(0.0, 1.0, 9)
     points = on_circle(axis, at, climb=0.2)
     three, axes = points[[0, 4, 8], None], axis[None]
-    centre, wrong = arcs_out.through(*three, axes, np.array([turn]), 1e-4)
+    centre, wrong = division.through(*three, axes, np.array([turn]), 1e-4)
     assert not wrong.any() and np.isfinite(centre).all()
-    angle = arcs_out.sweeps(three[0], three[2], centre, axes, np.array([turn]))
+    angle = division.sweeps(three[0], three[2], centre, axes, np.array([turn]))
     assert angle[0] == pytest.approx(turn, abs=1e-12)
     assert centre[0] - points[0] == pytest.approx(np.array([1.0, 2, 4]) + 0.14 * axis - points[0], abs=1e-12)
     arc = Curves(kind=np.array([ARC]), start=three[0], end=three[2], centre=centre, axis=axes, angle=angle)
     again = path_geometry.points(arc, np.zeros(9, np.int64), np.linspace(0, 1, 9))
     np.testing.assert_allclose(again, points, atol=1e-12)
     assert path_geometry.lengths(arc)[0] == pytest.approx(np.hypot(3.0 * turn, 0.2 * turn))
-    assert arcs_out.through(*three, axes, np.array([-turn]), 1e-4)[1].all()  # the middle lies on the other way round
+    assert division.through(*three, axes, np.array([-turn]), 1e-4)[1].all()  # the middle lies on the other way round
 
 
 def test_what_hardly_bends_is_a_line():
     z = np.array([[0.0, 0, 1]])
     start, end = np.zeros((1, 3)), np.array([[10.0, 0, 1]])
-    flat, wrong = arcs_out.through(start, np.array([[5.0, 1e-5, 0.5]]), end, z, np.array([-1.0]), 2e-4)
+    flat, wrong = division.through(start, np.array([[5.0, 1e-5, 0.5]]), end, z, np.array([-1.0]), 2e-4)
     assert np.isnan(flat).all() and not wrong.any()
 
 

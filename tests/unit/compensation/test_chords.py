@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
+from camcomp.compensation.program.division import divide, second_derivative, trial_nodes
 
 
 def miss(curve, nodes, shift):
