@@ -44,8 +44,8 @@ GUESSED_FROM = len(_PERIODS_S) * len(_DAMPINGS)
 
 
 def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[str, float]:
-    """Loop of logs of one axis by least squares, jointly with a constant and a first-order lag; empty where the axis rests or no
-    loop of a feed drive is like it.
+    """Loop of logs of one axis by least squares, jointly with a first-order lag, a constant, friction and the weight of a hinge;
+    empty where the axis rests or no loop of a feed drive is like it.
 
     runs: time (n,) s, set-points (n,), encoders (n,), NaN at instants between rows.
     """
@@ -54,7 +54,7 @@ def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[st
         return {}
     read = np.isfinite(np.concatenate([y for _, _, y in runs]))
     gap = np.concatenate([x - y for _, x, y in runs])[read]
-    beside = np.concatenate([np.stack([np.ones(len(t)), np.gradient(x, t)], axis=1) for t, x, _ in runs])[read]
+    beside = np.concatenate([_beside(t, x, hinge) for t, x, _ in runs])[read]
     Q = np.linalg.qr(beside)[0]
     lagged = max(float(np.linalg.lstsq(beside, gap, rcond=None)[0][1]), _LEAST_LAG_S)
 
@@ -74,6 +74,13 @@ def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[st
     period, damping, _ = np.exp(least_squares(left, first, bounds=widest, diff_step=1e-3, max_nfev=20).x).tolist()
     found = {"by_acceleration_ms2": (1e3 * period / (2.0 * np.pi)) ** 2, "damping": damping}
     return found if all(p.low < found[p.name] < p.high for p in FITTED) else {}
+
+
+def _beside(time: Floats, place: Floats, hinge: bool) -> Floats:
+    """What else a following error may hold (n, q): a constant, speed, friction, weight."""
+    speed = np.gradient(place, time)
+    weight = (np.sin(place), np.cos(place)) if hinge else ()
+    return np.stack([np.ones(len(time)), speed, np.sign(speed), *weight], axis=1)
 
 
 def public(fitted: Mapping[str, float]) -> dict[str, float]:

@@ -83,10 +83,23 @@ def _acts_pointwise(effect: Any) -> bool:
 
 
 def controlled(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> Floats:
-    """Encoders (n, m) of a motion whose encoders are still the set-points."""
-    encoder = motion.encoder
+    """Encoders (n, m) of a motion whose encoders are still the set-points.
+
+    What deflects a loop, such as friction, acts on it as a change of its set-points does: the effects listed before it follow,
+    except where no set-point makes them.
+    """
+    encoder, told = motion.encoder, motion
+    loops: list[Cause] = []
     for hook, cause in _hooks(causes, "on_servo"):
-        encoder = hook(encoder, motion, cause.which(actuators), cause.values)
+        behind = hook(encoder, motion, cause.which(actuators), cause.values)
+        law = cause.values.get("law")
+        if law is not None and law.deflects:
+            pushed = replace(told, encoder=told.encoder + behind - encoder)
+            behind = encoder + controlled(loops, actuators, pushed) - controlled(loops, actuators, told)
+            told = pushed
+        elif not cause.uncorrectable:
+            loops.append(cause)
+        encoder = behind
     return encoder
 
 

@@ -47,7 +47,8 @@ class ChannelData:
     large as the channel; between_s2: following error per acceleration by the motion between two rows. covariates (n,) of the
     dictionary. response: what causes with their amplitudes (d,) add to the channel of run k (n,). level: constant without a
     meaning. clock: standard deviation of the instants of rows against the motion, s. scatter: of the encoders by which the axis
-    moved, row by row.
+    moved, row by row. deflected: columns of healthy sizes that deflect a loop, as it follows
+    them beside causes that act on run k.
     """
 
     channel: ChannelName
@@ -72,6 +73,7 @@ class ChannelData:
     level: float = 0.0
     clock: float = 0.0
     scatter: float = 0.0
+    deflected: Callable[[int, Sequence[tuple[AxisCause, Floats]]], Sizes] = lambda run, acting: {}
 
     @property
     def hinge(self) -> bool:
@@ -100,6 +102,11 @@ class ChannelData:
     def with_misfit(self, left: Floats) -> ChannelData:
         """The data with the misfit of residuals (n,) of the fitted runs, each row over its noise."""
         return replace(self, misfit=max(float(np.sqrt(np.mean(left**2))) / self.floor, 1.0))
+
+    def where(self, terms: Sequence[AxisCause], at: Sequence[Floats]) -> ChannelData:
+        """The data with the healthy sizes beside causes that act, as they are with amplitudes (d,)."""
+        acting = [(term, own) for term, own in zip(terms, at, strict=True) if own.any()]
+        return replace(self, healthy=[{**own, **self.deflected(k, acting)} for k, own in enumerate(self.healthy)])
 
     def healthy_columns(self, run: int) -> Floats:
         """Columns (n, q) of healthy sizes of all kinds."""

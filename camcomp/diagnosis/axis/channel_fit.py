@@ -102,7 +102,7 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     if ACCELERATION in large:
         minor = _most_probable(replace(data, minor=frozenset({ACCELERATION})), terms)
         sd = min(free.sd, minor.sd)
-        at_floor = _excess(minor.data, minor.terms, minor.linear) <= data.floor**2
+        at_floor = _excess(minor.terms, minor.linear) <= data.floor**2
         if at_floor or free.log_evidence(sd) + prior_of_covariate(free.linear.model) < minor.log_evidence(sd):
             free, large = minor, {kind: own for kind, own in _large(minor).items() if kind != ACCELERATION}
     return replace(_answer(free), unmodelled=large)
@@ -112,7 +112,7 @@ def _large(fit: _Fit) -> dict[str, tuple[float, float]]:
     """Kinds of healthy sizes that are more than minor: share of the channel's energy, and log odds that they are."""
     data = fit.data
     out: dict[str, tuple[float, float]] = {}
-    sizes = residuals(data, fit.terms, fit.linear)[2]
+    sizes = residuals(fit.terms, fit.linear)[2]
     whole = float(np.mean(np.concatenate([data.values[k] for k in data.train]) ** 2))
     for kind in (each for each in BEYOND if each in sizes):
         square = float(np.mean(np.concatenate([data.healthy[k][kind] @ sizes[kind] for k in data.train]) ** 2))
@@ -126,6 +126,7 @@ def _large(fit: _Fit) -> dict[str, tuple[float, float]]:
 def _most_probable(data: ChannelData, terms: Sequence[AxisCause]) -> _Fit:
     at = [np.zeros(len(t.parameters)) for t in terms]
     for again in range(PASSES + 1):
+        data = data.where(terms, at)
         responses = [joint_columns(data, terms, k, at) for k in range(len(data.values))]
         data = with_misfit(data, responses)
         sd = noise_of_rows(data, responses)
@@ -137,20 +138,21 @@ def _most_probable(data: ChannelData, terms: Sequence[AxisCause]) -> _Fit:
         late = data.clock > 0.0 and again == 0  # rows may be late without any cause, too
         if again == PASSES or (not late and (same or not members)):
             break
-        left, _, sizes = residuals(data, terms, linear)
+        left, _, sizes = residuals(terms, linear)
         data = data.refined(left, sizes)
         terms, at = refined_shapes(data, terms, members, moved, sd)
-    if data.channel == "following" and _excess(data, terms, linear) > LOCAL * data.floor**2:
+    if data.channel == "following" and _excess(terms, linear) > LOCAL * data.floor**2:
         terms, linear, sd = _among_every_set(data, terms)
+        data = linear.data
     terms, linear = _without_needless_parameters(data, terms, linear, sd)
     return _Fit(data, *_without_needless(data, terms, linear, sd), sd)
 
 
-def _excess(data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit) -> float:
+def _excess(terms: Sequence[AxisCause], linear: LinearFit) -> float:
     """Mean square of what causes and healthy sizes, but for those that are minor, leave of the fitted runs, each row over its
     noise.
     """
-    left, _, sizes = residuals(data, terms, linear, small=False)
+    data, (left, _, sizes) = linear.data, residuals(terms, linear, small=False)
     left = [y + sum(data.healthy[k][kind] @ sizes[kind] for kind in data.minor) for k, y in enumerate(left)]
     return float(np.mean(data.in_floors(dict(enumerate(left))) ** 2))
 
@@ -166,15 +168,22 @@ def _among_every_set(data: ChannelData, terms: Sequence[AxisCause]) -> tuple[Seq
         at = [np.zeros(len(t.parameters)) for t in terms]
         linear, by = settled(data, terms, at, on=on, sd=data.floor, passes=1), [*terms]
         amount = by_term(linear.found.amplitudes()[0], terms)
-        at = [amount[i] if i in on else each for i, each in enumerate(at)]
+        at = [_begun(terms[i], amount[i]) if i in on else each for i, each in enumerate(at)]
         for _ in range(ROUNDS):
-            by, at = refined_shapes(data, by, on, at, data.floor)
-        responses = [joint_columns(data, by, k, at) for k in range(len(data.values))]
-        fits[on] = by, responses, noise_of_rows(data, responses)
-    sd = min(noise for _, _, noise in fits.values())
-    linear_of = {on: explained(data, by, responses, sd, on) for on, (by, responses, _) in fits.items()}
+            by, at = refined_shapes(data.where(by, at), by, on, at, data.floor)
+        here = data.where(by, at)
+        responses = [joint_columns(here, by, k, at) for k in range(len(data.values))]
+        fits[on] = by, here, responses, noise_of_rows(here, responses)
+    sd = min(noise for *_, noise in fits.values())
+    linear_of = {on: explained(here, by, responses, sd, on) for on, (by, here, responses, _) in fits.items()}
     best = max(fits, key=lambda on: _value(linear_of[on]))
     return fits[best][0], linear_of[best], sd
+
+
+def _begun(term: AxisCause, amount: Floats) -> Floats:
+    """Amplitudes (d,) of a cause from which it is fitted: those of its guess where a tangent has the wrong sign."""
+    wrong = any(p.sign * a < 0.0 for p, a in zip(term.parameters, amount, strict=True))
+    return np.array(term.steps) if wrong and term.steps else amount
 
 
 def _value(fit: LinearFit) -> float:
@@ -200,7 +209,7 @@ def _without_needless(
         fits = {on: settled(data, own, at, on=on, sd=sd) for on in sets}
         value = {on: _value(fit) for on, fit in fits.items()}
         best = max(sets[1:], key=lambda on: value[on])
-        more = _excess(data, own, fits[best]) - _excess(data, own, fits[every])
+        more = _excess(own, fits[best]) - _excess(own, fits[every])
         if value[best] < value[every] and more > (MINOR * data.floor) ** 2:
             break
         terms, linear = own, fits[best]
@@ -244,14 +253,14 @@ def _with_fewer_parameters(
 
 
 def _answer(fit: _Fit) -> ChannelFit:
-    data, terms, linear, sd = fit.data, fit.terms, fit.linear, fit.sd
-    found, model = linear.found, linear.model
+    terms, linear, sd = fit.terms, fit.linear, fit.sd
+    data, found, model = linear.data, linear.found, linear.model
     deviation = by_term(np.sqrt(np.diag(found.amplitudes()[1])), terms)
     at = model.posterior(found.background, found.data.slab(found.members))
     slots = {kind: np.arange(model.layout.size)[model.layout.covariates[kind]] for kind in linear.unit}
     every, units = np.concatenate([*slots.values()]), np.concatenate([*linear.unit.values()])
     among = at.covariance(every.tolist()) * np.outer(units, units)
-    left, amount, sizes = residuals(data, terms, linear)
+    left, amount, sizes = residuals(terms, linear)
     spreads = _spreads_of_shapes(data, terms, linear, amount, sd)
     scale = calibration_of("axes")
     causes, acting, imitated, train = [], [], [], [left[k] for k in data.train]

@@ -151,10 +151,10 @@ class DrivenAxis:
         """Encoders (n, 1) by the machine file."""
         return self.followed(())
 
-    def followed(self, causes: Sequence[Cause]) -> Floats:
-        """Encoders (n, 1) behind causes of the control, on top of those that the machine file states."""
+    def followed(self, causes: Sequence[Cause], asked: Motion | None = None) -> Floats:
+        """Encoders (n, 1) behind causes of the control, on top of those that the machine file states; asked: other set-points."""
         every = signal_path.on_top(causes, self.run.stated)
-        return signal_path.controlled(every, (self.actuator.name,), self.asked)
+        return signal_path.controlled(every, (self.actuator.name,), asked or self.asked)
 
     def known(self, causes: Sequence[Cause]) -> Bools:
         """Rows (n,) in which causes of the control do not depend on how the axis moved before its log began."""
@@ -164,10 +164,22 @@ class DrivenAxis:
         return np.asarray(np.interp(self.run.time, self.asked.time, unsure) == 0.0)
 
     def laws(self, texts: Sequence[str], causes: Sequence[Cause]) -> Floats:
-        """Effect of formulas at the stage control, behind causes, on the following error (n, q), in the study's mm."""
+        """Effect of formulas that deflect the loop behind causes on the following error (n, q), in the study's mm."""
         rows = DriveRows(self.asked, 0, followed=self.followed(causes)[:, 0])
-        added = [parse(text, AT_DRIVE)(rows, rows.rows) for text in texts]
-        return -self.lever * np.stack([np.interp(self.run.time, self.asked.time, each) for each in added], axis=1)
+        added = np.stack([parse(text, AT_DRIVE)(rows, rows.rows) for text in texts], axis=1)
+        deflected = self.deflected(self.asked.time, added, causes)
+        return -self.lever * np.stack([np.interp(self.run.time, self.asked.time, each) for each in deflected.T], axis=1)
+
+    def deflected(self, time: Floats, columns: Floats, causes: Sequence[Cause]) -> Floats:
+        """Columns (n, q) at instants (n,) that deflect the loop, as it follows them."""
+        loops = [cause for cause in causes if not cause.uncorrectable]
+        if not loops:
+            return columns
+        out = []
+        for each in columns.T:
+            pushed = replace(self.asked, encoder=self.asked.encoder + np.interp(self.asked.time, time, each)[:, None])
+            out.append(np.interp(time, self.asked.time, (self.followed(loops, pushed) - self.followed(loops))[:, 0]))
+        return np.stack(out, axis=1)
 
     def _compliance(self, cause: Cause | None) -> float:
         """Way of the drive per unit of its load."""

@@ -43,8 +43,10 @@ from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import PRESLIDING_MM
 
 TURNS_MM = (1e-4, 0.003, 0.02, 0.1)  # ways over which the friction of a slide turns round in its following error
+DEFLECTS = ("friction", "weight", "asymmetry")  # kinds that act on a loop
 CORNERS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0)  # times the speed at which a hinge's friction turns round: of a polygon
-CREEP = 0.02  # of the fastest row: speed at which Coulomb friction has turned round
+# of the fastest row: speeds at which the friction of a hinge turns round in its following error
+CREEP = (0.005, 0.01, 0.02, 0.05)
 
 
 def study_channel(found: AxisFindings, rows: ChannelData, around: AxisSurroundings, without: set[str]) -> AxisChannel:
@@ -60,8 +62,19 @@ def study_channel(found: AxisFindings, rows: ChannelData, around: AxisSurroundin
         return axes[k].channel(rows.channel, causes)[seen[k]] if causes else np.zeros(len(rows.values[k]))
 
     healthy, inertia = _healthy(found, rows, around, axes)
+
+    def deflected(k: int, acting: Sequence[tuple[AxisCause, Floats]]) -> dict[str, Floats]:
+        if not following:
+            return {}
+        causes = [term.cause(own.tolist()) for term, own in acting]
+        return {
+            kind: axes[k].deflected(rows.moves[k].time, own, causes)
+            for kind, own in healthy[k].items()
+            if kind in DEFLECTS
+        }
+
     data = replace(
-        rows, healthy=healthy, inertia=inertia, covariates=_covariates(found, rows, around), response=response,
+        rows, deflected=deflected, healthy=healthy, inertia=inertia, covariates=_covariates(found, rows, around), response=response,
         clock=WITHIN * _step(rows.moves) if force else 0.0,
         level=0.0 if following else float(np.mean(np.concatenate([rows.values[k] for k in rows.train]))),
     )  # fmt: skip
@@ -117,13 +130,21 @@ def _following_laws(rows: ChannelData) -> dict[str, tuple[str, ...]]:
     The speed is that of a lag too small or too unsure to be a cause.
     """
     hinge = rows.hinge
-    place, creep = "followed_rad" if hinge else "followed_mm", max(CREEP * rows.fastest / lever_mm(hinge), 1e-12)
+    place = "followed_rad" if hinge else "followed_mm"
     out = {"acceleration": (f"{place}_per_s2",), "speed": (f"{place}_per_s",), "offset": ("1",)}
     if rows.asymmetric:
         out["asymmetry"] = (f"abs({place}_per_s)",)
     if not hinge:
         return out | {"friction": tuple(f"way({place}, {each:g})" for each in TURNS_MM)}
-    return out | {"friction": (f"tanh({place}_per_s/{creep:.6g})",), "weight": (f"sin({place})", f"cos({place})")}
+    return out | {
+        "friction": tuple(f"tanh({place}_per_s/{each:.6g})" for each in _creep(rows) / lever_mm(hinge)),
+        "weight": (f"sin({place})", f"cos({place})"),
+    }
+
+
+def _creep(rows: ChannelData) -> Floats:
+    """Speeds (q,) at which the friction of a hinge turns round in its following error, in the study's mm/s."""
+    return np.maximum(np.array(CREEP) * rows.fastest, 1e-12)
 
 
 def _all(texts: Mapping[str, Sequence[str]]) -> list[str]:
@@ -190,14 +211,14 @@ def _healthy(
         else:
             own[ACCELERATION] = m.acceleration[:, None]
         if rows.channel == "following" and hinge:
-            own |= {"friction": np.tanh(m.speed / max(CREEP * rows.fastest, 1e-12))[:, None], "weight": weight}
+            own |= {"friction": np.tanh(m.speed[:, None] / _creep(rows)), "weight": weight}
         elif rows.channel == "following":
             own["friction"] = np.stack([m.reversal(way) for way in TURNS_MM], axis=1)
+        if rows.asymmetric:
+            own["asymmetry"] = np.abs(m.speed)[:, None]
         if rows.between:
             straight = len(axes[k].asked.time) == len(rows.runs[k].asked[0])  # no instants between rows
             own[BETWEEN] = straight * rows.between[k]
-        if rows.asymmetric:
-            own["asymmetry"] = np.abs(m.speed)[:, None]
         if force:
             own[TURNING] = _turning(m, turns)
         moved = {kind: own[kind] for kind in own if kind == ACCELERATION}

@@ -31,8 +31,11 @@ SHAPE_SD = 1.5  # of the logarithm of a shape: scans of shapes span four
 
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """Posterior over sets of causes of a channel, and channel units per amplitude of its healthy columns (q,), by kind."""
+    """Posterior over sets of causes of a channel where they are made linear, and channel units per amplitude of its healthy
+    columns (q,), by kind.
+    """
 
+    data: ChannelData
     model: LinearModel
     found: Explanation
     unit: Mapping[str, Floats]
@@ -50,8 +53,9 @@ def settled(
     """The fit of one set of causes, made linear where it stands."""
     at = [each if i in on else np.zeros(len(each)) for i, each in enumerate(at)]
     for again in range(passes):
-        responses = [joint_columns(data, terms, k, at) for k in range(len(data.values))]
-        linear = explained(data, terms, responses, sd, on)
+        here = data.where(terms, at)
+        responses = [joint_columns(here, terms, k, at) for k in range(len(data.values))]
+        linear = explained(here, terms, responses, sd, on)
         amount = by_term(linear.found.amplitudes()[0], terms)
         if again < passes - 1:
             at = [amount[i] if i in on else each for i, each in enumerate(at)]
@@ -207,7 +211,7 @@ def explained(
     )
     data_of = model.reduced(Background())
     values = search_sets(data_of, CAUSES) if on is None else {on: max(data_of.value(on), -1e300)}
-    return LinearFit(model, posterior_of(model, {Background(): values}), unit)
+    return LinearFit(data, model, posterior_of(model, {Background(): values}), unit)
 
 
 def covariate_ranges(data: ChannelData) -> dict[str, tuple[float, float]]:
@@ -226,13 +230,13 @@ def by_term(values: Floats, terms: Sequence[AxisCause]) -> list[Floats]:
 
 
 def residuals(
-    data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit, *, small: bool = True
+    terms: Sequence[AxisCause], linear: LinearFit, *, small: bool = True
 ) -> tuple[list[Floats], list[Floats], dict[str, Floats]]:
     """Residuals (n,) per run, amplitudes of all terms, and healthy sizes by kind.
 
     small: whether causes that do not act have the small errors of a healthy machine.
     """
-    found, model = linear.found, linear.model
+    data, found, model = linear.data, linear.found, linear.model
     mean = model.posterior(found.background, found.data.slab(found.members)).mean
     sizes = {kind: unit * mean[model.layout.covariates[kind]] for kind, unit in linear.unit.items()}
     errors = by_term(small * mean, terms)

@@ -69,7 +69,7 @@ def probability_with_unmodelled(
         if not (square > 0.0 and spread.sum() > 0.0):
             continue
         size = float(np.sqrt(square / rows))
-        slabs = np.array(WIDTHS) * floor * size / whole
+        slabs = np.array(WIDTHS) * max(floor, whole / WIDTHS[-1]) * size / whole
         scale = excess * max(float(np.sqrt(along @ along / spread.sum())), 1e-9)
         without.append(float(t.logpdf(size / scale, spread.sum() ** 2 / (spread**2).sum()) - np.log(scale)))
         with_cause.append(float(logsumexp(norm.logpdf(size, 0.0, np.hypot(slabs, scale))) - np.log(len(slabs))))

@@ -35,7 +35,7 @@ AT_DRIVE = {
     "act_rad": "position of a hinge",
     "act_rad_per_s": "its velocity",
     "act_rad_per_s2": "its acceleration",
-    "followed_mm": "position that the effects listed above make of the set-points of a slide, at the stage control",
+    "followed_mm": "position that the effects listed above make of the set-points of a slide, at the stage control; what depends on it pushes the loop, which follows as late",
     "followed_mm_per_s": "its velocity",
     "followed_mm_per_s2": "its acceleration",
     "followed_rad": "the same of a hinge",

@@ -47,6 +47,11 @@ class EmpiricalLaw:
     factor: float = 1.0
     label: str = ""
 
+    @property
+    def deflects(self) -> bool:
+        """Whether it is a push on a control loop, which is followed as set-points are: a law of the motion behind the loop."""
+        return self.on == "control" and any(name.startswith("followed") for name in self.shape.names)
+
     def values(self, rows: TipRows | DriveRows) -> Floats:
         """Error (n,) that the law adds; it fades outside the envelope, with one warning."""
         n = rows.rows

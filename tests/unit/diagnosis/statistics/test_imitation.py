@@ -32,6 +32,11 @@ def test_a_lag_that_explains_as_much_as_is_unmodelled_is_not_sure_and_a_large_on
     assert np.mean([drawn(rng, True, 300.0) > 0.95 for _ in range(100)]) > 0.95
 
 
+def test_a_lag_of_thousands_of_floors_is_sure_beside_what_is_small_against_it():
+    rng = np.random.default_rng(3)
+    assert np.mean([drawn(rng, True, 10000.0) > 0.95 for _ in range(20)]) == 1.0
+
+
 def test_stated_probabilities_come_true():
     """Half of the draws hold a lag, of the sizes that slabs have."""
     rng = np.random.default_rng(2)
