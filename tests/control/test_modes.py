@@ -102,7 +102,7 @@ def test_lines_stay_where_the_control_leaves_them_within_the_tolerance(orthoglid
 def test_the_stops_of_g61_cost_what_the_lines_cost(orthoglide):
     lines = compensated(orthoglide, circle(25.0, 3000), "G61", arcs=False).control
     assert lines.original.seconds < 5.0 and lines.after_s > 10.0
-    assert np.linalg.norm(lines.error, axis=1).max() < 1e-3
+    assert np.linalg.norm(lines.account.latest, axis=1).max() < 1e-3
 
 
 @pytest.mark.parametrize("mode", ["G64 P0.01", "G64 P0.02 Q0.005"])
@@ -142,7 +142,9 @@ def test_arcs_that_stay_as_programmed_keep_their_turns(arc):
     job = Job(load_config([shipped("config/cartesian.yaml"), shipped("config/no-force.yaml")]))
     done = compensated(job, ["G0 X15 Y0 Z0", f"{arc} I-15 J0 F1200"], "G64 P0.0005\n")
     assert done.control.after_s == pytest.approx(done.control.original.seconds, rel=1e-9)
-    assert 1e3 * np.linalg.norm(done.control.error, axis=1).max() <= 1.0  # um: what P0.0005 allows for, and its ends
+    assert (
+        1e3 * np.linalg.norm(done.control.account.latest, axis=1).max() <= 1.0
+    )  # um: what P0.0005 allows for, and its ends
 
 
 def test_where_the_control_goes_off_is_told_with_its_lines(orthoglide):
@@ -182,7 +184,7 @@ def test_the_control_rests_between_cuts_and_joining_lines(orthoglide):
     text = done.written.data.decode().splitlines()
     assert [each for each in text if each.startswith("G6")] == ["G64", "G61", "G64", "G61", "G64"]
     assert done.control.rest.sum() == 4
-    assert np.nanmax(sizes(done.control.error[done.control.points.joined])) <= 1e-3
+    assert np.nanmax(sizes(done.control.account.latest[done.control.points.joined])) <= 1e-3
     assert any(each.startswith("G61 is written at 4 ends") for each in Totals.of(done, orthoglide).warnings)
     read = read_program(done.written.data, name="out.nc", setup=setup_of(orthoglide.config))
     rests = np.flatnonzero([mode.exact for mode in read.modes])

@@ -32,15 +32,10 @@ class BandTotals:
 
     def __init__(self, inputs: Sequence[UncertainJob]) -> None:
         self.inputs = [each.source for each in inputs]
-        self._count, self._square, self._by_input = 0, 0.0, np.zeros(len(inputs))
+        self.points, self._square, self._by_input = 0, 0.0, np.zeros(len(inputs))
         self._kept: list[tuple[Floats, TipMoves]] = []
         self._weight: list[int] = []
         self.shrunk = self.alone = 0  # points that take less than all of the correction, and none of it
-
-    @property
-    def points(self) -> int:
-        """How many points count."""
-        return self._count
 
     def add(self, error: Floats, moves: TipMoves, share: Floats | None = None) -> None:
         """Add points: errors (n, 3) mm at the stated values, tip moves by input, shares (n,) of the correction."""
@@ -51,7 +46,7 @@ class BandTotals:
             error, moves = error[known], moves.take(np.flatnonzero(known))
         if not len(error):
             return
-        self._count += len(error)
+        self.points += len(error)
         mean = error + moves.mean
         squares = moves.squares
         self._square += float((mean**2).sum() + squares.sum())
@@ -62,7 +57,7 @@ class BandTotals:
 
     def join(self, other: BandTotals) -> BandTotals:
         """Add the totals of another part of the program; return self."""
-        self._count, self._square = self._count + other._count, self._square + other._square
+        self.points, self._square = self.points + other.points, self._square + other._square
         self._by_input = self._by_input + other._by_input
         self._kept += other._kept
         self._weight += other._weight
@@ -71,7 +66,7 @@ class BandTotals:
 
     def expected(self) -> Expected:
         """Expected error, µm, over drawn machines; zero without points."""
-        if not self._count:
+        if not self.points:
             return Expected(0.0, 0.0, (0.0, 0.0))
         z = np.random.default_rng(0).standard_normal((len(self.inputs), MACHINES))
         total, sizes, weights = np.zeros(MACHINES), [], []
@@ -80,11 +75,11 @@ class BandTotals:
             total += count * square.mean(axis=0)
             sizes.append(square.ravel())
             weights.append(np.full(square.size, count / square.size))
-        rms = np.sqrt(total / self._count)
+        rms = np.sqrt(total / self.points)
         tail = 0.5 * (1.0 - LEVEL)
         low, high = np.quantile(rms, (tail, 1.0 - tail))
         p95 = np.sqrt(_weighted_quantile(np.concatenate(sizes), np.concatenate(weights), LEVEL))
-        mean = np.sqrt(self._square / self._count)
+        mean = np.sqrt(self._square / self.points)
         return Expected(1e3 * float(mean), 1e3 * float(p95), (1e3 * float(low), 1e3 * float(high)))
 
     def shares(self) -> list[tuple[str, float]]:

@@ -14,7 +14,7 @@ import numpy as np
 from camcomp.compensation.bands.scatter import TipMoves
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.errors import PhysicsError
-from camcomp.ground.records import dataclass, replace
+from camcomp.ground.records import replace
 from camcomp.model.drawn import UncertainJob, uncertain_jobs
 from camcomp.model.job import Job
 from camcomp.model.statics.machine import Machine
@@ -107,7 +107,7 @@ class TipField:
     def _supporting(self, points: Floats, degree: int, random: np.random.Generator) -> _Fit:
         """Fit the known solutions, after solving more points outside the support of the fit."""
         for left in range(EXTENSIONS, -1, -1):
-            fit = _Fit.of(self._known, self._values, degree, np.concatenate((self._known, points)))
+            fit = _Fit(self._known, self._values, degree, np.concatenate((self._known, points)))
             lone = np.flatnonzero(~fit.supports(fit.terms(points)))
             if not left or len(lone) <= FEW * len(points):
                 break
@@ -201,28 +201,19 @@ def _exponents(degree: int) -> Ints:
     return np.array(out, np.int64)
 
 
-@dataclass(frozen=True, eq=False)
 class _Fit:
     """Polynomials in position and force, each scaled to [-1, 1] over the program."""
 
-    middle: Floats  # (6,)
-    half: Floats  # (6,)
-    exponents: Ints
-    coefficients: Floats  # (t, q)
-    spread: Floats  # (t, t) turns terms into vectors whose square is the leverage of the point
-
-    @staticmethod
-    def of(points: Floats, values: Floats, degree: int, everywhere: Floats) -> _Fit:
+    def __init__(self, points: Floats, values: Floats, degree: int, everywhere: Floats) -> None:
         low, high = everywhere.min(axis=0), everywhere.max(axis=0)
-        nothing = np.zeros((0, 0))
-        blank = _Fit(0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-9), _exponents(degree), nothing, nothing)
-        u, size, v = np.linalg.svd(blank.terms(points), full_matrices=False)
-        inverse = 1.0 / np.maximum(
-            size, 1e-6 * size[0]
-        )  # directions that the points do not determine have a large leverage
+        self.middle, self.half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-9)
+        self.exponents = _exponents(degree)
+        u, size, v = np.linalg.svd(self.terms(points), full_matrices=False)
+        # Directions that the points do not determine have a large leverage.
+        inverse = 1.0 / np.maximum(size, 1e-6 * size[0])
         solved = np.where(size > 1e-6 * size[0], inverse, 0.0)
-        coefficients: Floats = v.T @ (solved[:, None] * (u.T @ values))
-        return _Fit(blank.middle, blank.half, blank.exponents, coefficients, v.T * inverse)
+        self.coefficients: Floats = v.T @ (solved[:, None] * (u.T @ values))  # (t, q)
+        self.spread = v.T * inverse  # (t, t) turns terms into vectors whose square is the leverage of the point
 
     def terms(self, points: Floats) -> Floats:
         """Terms (n, t) at points (n, 6)."""

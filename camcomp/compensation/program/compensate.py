@@ -282,7 +282,7 @@ class _Correction:
         tolerance, step = self.budget.copy(), self.step
         tolerance[self.whole] = np.inf
         able = self.feeding & ~self.kept & (arcs and not self.job.causes)  # no arc follows waves that drives leave over
-        bend = Bend.of(
+        bend = Bend(
             track=self.track, trial=self.trial, commanded=self.aimed.commanded, second=self.second,
             tolerance=tolerance, able=able,
         )  # fmt: skip

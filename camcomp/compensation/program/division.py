@@ -118,39 +118,30 @@ def tangents(nodes: Nodes, x: Floats) -> Floats:
     return np.where((count < 3)[:, None], 0.0, first + side * second)
 
 
-@dataclass(eq=False)
 class Bend:
-    """What pieces are divided for. use (p,): pieces that come out as arcs."""
+    """What pieces (p,) are divided for: lines, or arcs where those are few enough."""
 
-    lines: Floats  # (k, 3) x'' at the trial nodes
-    arcs: Floats  # (k, 3) the same without what an arc takes up
-    sweep: Floats  # (p,) rad
-    use: Bools
-    straight: Ints  # (p,) moves that lines take
-
-    @classmethod
-    def of(cls, track: Track, trial: Nodes, commanded: Floats, second: Floats, tolerance: Floats, able: Bools) -> Bend:
-        """Arcs for the pieces (p,) that are `able` and need few enough of them."""
-        if not (able & (track.path.kind[track.motion] == ARC)).any():
-            none = np.zeros(len(able))
-            return cls(second, second, none, none > 0.0, none.astype(np.int64))
-        axis = track.path.axis[track.motion][trial.piece]
-        along = tangents(trial, commanded)
-        side = np.cross(axis, along)
-        side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-300)
-        rest = second.copy()  # columns behind those of the tip bend with arcs as with lines
-        rest[:, :3] -= np.sum(second[:, :3] * side, axis=1, keepdims=True) * side
+    def __init__(
+        self, track: Track, trial: Nodes, *, commanded: Floats, second: Floats, tolerance: Floats, able: Bools
+    ) -> None:
+        """Commanded (k, 3), second (k, c): tips at the trial nodes and their x''. able (p,): pieces that may become arcs."""
         arc = track.path.kind[track.motion] == ARC
-        sweep = np.where(arc, np.abs(np.nan_to_num(track.path.angle[track.motion])) * (track.u1 - track.u0), 0.0)
-        bend = cls(second, rest, sweep, np.zeros(len(arc), np.bool_), np.zeros(len(arc), np.int64))
-        bend.straight = np.diff(bend.divided(trial, tolerance)[0].first) - 1
-        bend.use = able & arc
-        bend.use &= ~bend.pointless(bend.divided(trial, tolerance)[0])
-        return bend
+        self.lines = self.arcs = second  # (k, c) x'' at the trial nodes, and without what an arc takes up
+        self.sweep = np.where(arc, np.abs(np.nan_to_num(track.path.angle[track.motion])) * (track.u1 - track.u0), 0.0)
+        self.use = np.zeros(len(arc), np.bool_)  # pieces that come out as arcs
+        if not (able & arc).any():
+            return
+        side = np.cross(track.path.axis[track.motion][trial.piece], tangents(trial, commanded))
+        side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-300)
+        self.arcs = second.copy()  # columns behind those of the tip bend with arcs as with lines
+        self.arcs[:, :3] -= np.sum(second[:, :3] * side, axis=1, keepdims=True) * side
+        self.straight = np.diff(self.divided(trial, tolerance)[0].first) - 1  # moves that lines take
+        self.use = able & arc
+        self.use &= ~self.pointless(self.divided(trial, tolerance)[0])
 
     def pointless(self, nodes: Nodes) -> Bools:
         """Pieces (p,) with so many arcs that lines are as good."""
-        return self.use & (np.diff(nodes.first) - 1 > FEWER * self.straight)
+        return self.use & (np.diff(nodes.first) - 1 > FEWER * self.straight) if self.use.any() else self.use
 
     def divided(self, trial: Nodes, tolerance: Floats) -> tuple[Nodes, Floats]:
         """Division points and their shifts."""

@@ -57,7 +57,7 @@ def loaded_cut(job: Job, program: Program, step_mm: float = STEP_MM) -> LoadedCu
     bounds = Bounds().add(path)
     engaged = memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds).follow(path)[0]
     track = lay_track(path, job.conditions, engaged)
-    way = Way.of(track, step_mm)
+    way = Way(track, step_mm)
     piece, w, on = way.piece, way.w, way.on
     travel = travel_of(job, track, piece[on], w[on])
 
@@ -89,10 +89,15 @@ def cut_surface(job: Job, program: Program) -> Surface:
 
     Raises ConfigError CC298 without a stock, PhysicsError where the machine cannot be.
     """
+    refuse_without_stock(job)
+    return surface_of(loaded_cut(job, program).memory)
+
+
+def refuse_without_stock(job: Job) -> None:
+    """Raises ConfigError CC298 without a stock."""
     if job.config.workpiece.stock is None:
         message = "there is no stock that could be cut"
         raise ConfigError("CC298", message, at=job.config.at("workpiece"), hint="add workpiece: stock")
-    return surface_of(loaded_cut(job, program).memory)
 
 
 def meant_cut(job: Job, program: Program) -> StockMemory:
@@ -109,25 +114,13 @@ def nodes_of(program: Program) -> int:
     return int(np.ceil(np.nan_to_num(path_geometry.lengths(program.path)[feeds]) / STEP_MM).sum()) + int(feeds.sum())
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
 class Way:
-    """Nodes (k,) of a track in order, first and last of every piece among them."""
+    """Nodes (k,) of a track in order, first and last of every piece among them.
 
-    piece: Ints
-    w: Floats
-    told: Floats  # (k, 3) mm programmed tip
-    direction: Floats  # (k, 3) of the feed; where pieces join it is that between theirs
-    on: Ints  # rows that are in program coordinates
-    feeds: Bools  # (k,) the piece takes material away
-    loads: Bools  # (k,) the force of what the tool meets acts
-    fixed: Floats  # (k, 3) N of models that know the force of a plunge, too
-    s: Floats  # (k,) mm of the program's way
-    run: Ints  # (k,) number of the run of feeds without a sharp corner
-    run_length: Floats  # (k,) mm
+    At most step_mm apart where the tool feeds, and so that chords of arcs miss by less than SAGITTA_MM.
+    """
 
-    @classmethod
-    def of(cls, track: Track, step_mm: float) -> Way:
-        """Nodes at most step_mm apart where the tool feeds, and so that chords of arcs miss by less than SAGITTA_MM."""
+    def __init__(self, track: Track, step_mm: float) -> None:
         path, motion, n = track.path, track.motion, len(track.motion)
         seen = path.known[motion] & ~path.machine[motion]
         feeds = (path.kind[motion] != RAPID) & seen & (track.length > 0.0)
@@ -135,21 +128,23 @@ class Way:
         radius = np.divide(track.length, angle, out=np.full(n, np.inf), where=angle > 0.0)
         step = np.minimum(step_mm, np.sqrt(8.0 * SAGITTA_MM * radius))
         count = np.where(feeds, np.maximum(np.ceil(track.length / np.maximum(step, 1e-3)), 1), 1).astype(np.int64) + 1
-        piece = np.repeat(np.arange(n), count)
+        self.piece = piece = np.repeat(np.arange(n), count)
         k = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
-        w = k / (count[piece] - 1)
-        direction = _directions(track, feeds, piece, w)
-        across = lateral(direction, np.asarray(track.conditions.tool_axis)) > PLUNGE_SINE
-        loads = feeds[piece] & across & (track.conditions.model is not None)
-        fixed = track.force(piece, w) if track.conditions.plunges else np.zeros((len(piece), 3))
+        self.w = w = k / (count[piece] - 1)
+        self.told = track.points(piece, w)  # (k, 3) mm programmed tip
+        self.direction = _directions(
+            track, feeds, piece, w
+        )  # (k, 3) of the feed; where pieces join that between theirs
+        self.on = np.flatnonzero(seen[piece])  # rows that are in program coordinates
+        self.feeds = feeds[piece]  # the piece takes material away
+        across = lateral(self.direction, np.asarray(track.conditions.tool_axis)) > PLUNGE_SINE
+        self.loads = self.feeds & across & (track.conditions.model is not None)  # the force of what the tool meets acts
+        # (k, 3) N of models that know the force of a plunge, too
+        self.fixed = track.force(piece, w) if track.conditions.plunges else np.zeros((len(piece), 3))
+        self.s = track.s0[piece] + w * track.length[piece]  # mm of the program's way
         run = _runs(track, feeds)
-        long = np.bincount(run, track.length).astype(float)[run]
-        s = track.s0[piece] + w * track.length[piece]
-        told, on = track.points(piece, w), np.flatnonzero(seen[piece])
-        return cls(
-            piece=piece, w=w, told=told, direction=direction, on=on, feeds=feeds[piece], loads=loads, fixed=fixed,
-            s=s, run=run[piece], run_length=long[piece],
-        )  # fmt: skip
+        self.run = run[piece]  # number of the run of feeds without a sharp corner
+        self.run_length = np.bincount(run, track.length).astype(float)[self.run]  # mm
 
 
 def _directions(track: Track, feeds: Bools, piece: Ints, w: Floats) -> Floats:

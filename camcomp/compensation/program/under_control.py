@@ -93,11 +93,6 @@ class UnderControl:
         return ControlAccount.of(self.programmed, self.limits)
 
     @property
-    def error(self) -> Floats:
-        """Errors (k, 3) mm at the points."""
-        return self.account.latest
-
-    @property
     def after_s(self) -> float:
         """Execution time of the written program."""
         return self.account.seconds
@@ -117,7 +112,7 @@ class UnderControl:
     @property
     def off_joins(self) -> float:
         """Largest error apart from joining lines, mm."""
-        size = sizes(self.error[~self.points.joined])
+        size = sizes(self.account.latest[~self.points.joined])
         return float(np.nanmax(size, initial=0.0))
 
     def leaves_room(self, tolerance_um: float) -> bool:

@@ -97,24 +97,22 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     )  # fmt: skip
     first, last, joins = matching.match(foreign=bool(foreign))
     moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
-    points = _Points.of(asked, corrected.path, *_samples(corrected.path, moving, first[moving], last[moving]))
+    points = _Points(asked, corrected.path, *_samples(corrected.path, moving, first[moving], last[moving]))
     guess = points.fraction(reach)
     with part(0.3, 0.9):
         residual, w = points.matched(guess)
     # Rapids and starts are only there because drives remember them.
     judged = (points.f > 0.0) & (original.path.kind[track.motion[points.piece]] != RAPID)
     judged &= ~passed_turns(load_turns(job, track), points.piece, points.move, points.f, w)
-    error = points.gap(w)[judged]
-    seen = points.counted()[judged]
-    control = of_text(
-        original, corrected, job, points.move[judged][seen], told=points.commanded[judged][seen], error=error[seen]
-    )
+    travel, tip, error = points.tip_errors(w)
+    seen = np.flatnonzero(judged & points.counted())
+    control = of_text(original, corrected, job, points.move[seen], told=points.commanded[seen], error=error[seen])
     missed, totals = None, None
     if shares is not None:
-        residual, missed = points.beside(w)
-        missed = missed[judged]
+        residual = sizes(tip - track.points(points.piece, w))
+        missed = points.missed(w, travel, error)[judged]
     if job.config.uncertain:
-        totals = points.expected_error(w, judged & (points.f == 1.0))
+        totals = points.expected_error(w, travel, tip, judged & (points.f == 1.0))
     return Verified(
         residual=residual[judged], lines=points.by_line(w, judged, residual, missed), joining=joins, control=control,
         warnings=[*original.warnings, *foreign], missed=missed, totals=totals, policy=job.config.compensation.policy,
@@ -173,25 +171,13 @@ class _Original(Programmed):
         return np.bincount(nodes.piece[1:][inside], step[inside], len(corrected)).astype(np.float64)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
 class _Points:
     """Points (k,) looked at: fractions f of the moves of the corrected path that belong to a piece of the original."""
 
-    asked: _Original
-    path: Path
-    piece: Ints
-    move: Ints
-    f: Floats
-    commanded: Floats  # (k, 3) mm
-    rotation: Floats | None  # (k, 3, 3) that the corrected program commands
-
-    @classmethod
-    def of(cls, asked: _Original, path: Path, piece: Ints, move: Ints, f: Floats) -> _Points:
-        """Points of the corrected path."""
-        turning = asked.orienting
-        rotation = None if turning is None else turning.platform(turning.words(path, move, f))
-        told = path_geometry.points(path, move, f)
-        return cls(asked=asked, path=path, piece=piece, move=move, f=f, commanded=told, rotation=rotation)
+    def __init__(self, asked: _Original, path: Path, piece: Ints, move: Ints, f: Floats) -> None:
+        self.asked, self.path, self.piece, self.move, self.f = asked, path, piece, move, f
+        self.commanded, turning = path_geometry.points(path, move, f), asked.orienting
+        self.rotation = None if turning is None else turning.platform(turning.words(path, move, f))  # as commanded
 
     def counted(self) -> Bools:
         """Points (k,) that a compensation looks at, too: ends and middles of moves, quarters of arcs that it changed."""
@@ -199,17 +185,15 @@ class _Points:
         changed = (self.path.end[move] != track.path.end[track.motion[self.piece]]).any(axis=1)
         return np.asarray(self.f * np.where(changed & (self.path.kind[move] == ARC), 4, 2) % 1.0 == 0.0)
 
-    def travel(self, w: Floats) -> Travel:
-        """Travel at fractions w (k,) of the pieces, in the commanded orientation."""
-        travel = self.asked.travel(self.piece, w)
-        return travel if self.rotation is None else replace(travel, rotation=self.rotation)
+    def tip_errors(self, w: Floats) -> tuple[Travel, Floats, Floats]:
+        """Travel at fractions w (k,) of the pieces, loaded tips (k, 3) mm, and their errors (k, 3) mm there.
 
-    def gap(self, w: Floats) -> Floats:
-        """Vectors (k, 3) mm from fractions w (k,) of the pieces to the loaded tip; with a policy, to where it wants the tip."""
-        asked, travel = self.asked, self.travel(w)
+        The travel is in the commanded orientation; errors that the policy accepts are none.
+        """
+        asked, travel = self.asked, self.asked.travel(self.piece, w)
+        travel = travel if self.rotation is None else replace(travel, rotation=self.rotation)
         tip, _ = respond(asked.job, self.commanded, travel)
-        gap: Floats = tip - asked.track.points(self.piece, w) - asked.accepted(self.piece, w, travel)
-        return gap
+        return travel, tip, tip - asked.track.points(self.piece, w) - asked.accepted(self.piece, w, travel)
 
     def fraction(self, reach: Floats) -> Floats:
         """First guess (k,) of the fraction of each piece: by the length of the path that ought to be commanded."""
@@ -241,7 +225,7 @@ class _Points:
 
         def seen(w: Floats) -> tuple[Floats, Floats]:
             """Distance from the place, and how far the tip lies ahead of it, mm."""
-            gap = self.gap(w)
+            gap = self.tip_errors(w)[2]
             tangent = path_geometry.tangents(track.path, track.motion[piece], track.u(piece, w))
             return sizes(gap), np.sum(gap * tangent, axis=1)
 
@@ -260,27 +244,31 @@ class _Points:
             last_w, last_along, w = w, along, better
         return nearest, best
 
-    def beside(self, w: Floats) -> tuple[Floats, Floats]:
-        """Distances (k,) mm of the loaded tip from its place on the programmed path, and from where the policy wants it.
+    def missed(self, w: Floats, travel: Travel, error: Floats) -> Floats:
+        """Distances (k,) mm of the loaded tip from where the policy wants it.
 
         The share that was taken may be another than the policy's by ALLOWED_SHARE: it rests on derivatives, and the rest
         of the distance on the solver.
         """
-        asked, travel = self.asked, self.travel(w)
-        target, beside = asked.track.points(self.piece, w), self.gap(w)
-        from_path = beside + asked.accepted(self.piece, w, travel)
-        off = aim_at(asked.job, target, travel, "newton").commanded - target
+        target = self.asked.track.points(self.piece, w)
+        off = aim_at(self.asked.job, target, travel, "newton").commanded - target
         size = np.maximum(sizes(off), 1e-12)
-        along = np.einsum("ni,ni->n", beside, off) / size
+        along = np.einsum("ni,ni->n", error, off) / size
         along = np.clip(along, -ALLOWED_SHARE * size, ALLOWED_SHARE * size)
-        return sizes(from_path), sizes(beside - (along / size)[:, None] * off)
+        return sizes(error - (along / size)[:, None] * off)
 
-    def expected_error(self, w: Floats, end: Bools) -> BandTotals:
+    def expected_error(self, w: Floats, travel: Travel, tip: Floats, end: Bools) -> BandTotals:
         """What machines that may be leave at the ends (k,) of moves; the other points are only there because drives remember."""
         job, track, shares = self.asked.job, self.asked.track, self.asked.shares
         at = np.arange(len(end)) if job.causes else np.flatnonzero(end)
-        piece, w, commanded, end, travel = self.piece[at], w[at], self.commanded[at], end[at], self.travel(w).take(at)
-        tip, _ = respond(job, commanded, travel)
+        piece, w, commanded, end, tip, travel = (
+            self.piece[at],
+            w[at],
+            self.commanded[at],
+            end[at],
+            tip[at],
+            travel.take(at),
+        )
         moves = tip_moves(job, track, piece, w, commanded=commanded, travel=travel, base=tip)
         taken = None if shares is None else shares.at(track, piece, w)[end]
         totals = BandTotals(tip_field_of(job).inputs)

@@ -59,7 +59,7 @@ class DrawnPath:
         self.change = 1e3 * (result.state.rho - result.nominal)  # (N, m) um or mrad
         self.drive = result.state.drive * np.where(job.machine.revolute, 1e-3, 1.0)  # (N, m) N or N m
         self.before, self.after = (largest(each, result.judged) for each in (result.before, result.after))
-        self.driven = largest(result.control.error, points.move)  # with what the controller merges and rounds
+        self.driven = largest(result.control.account.latest, points.move)  # with what the controller merges and rounds
         self.mode = mode_name(result.control.modes)
 
     def worst(self, size: Floats) -> int:

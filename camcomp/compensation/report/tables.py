@@ -48,23 +48,21 @@ def joint_columns(job: Job, oriented: bool = False) -> list[str]:
 
 
 class JointTable:
-    """Rows of a joint table."""
+    """A joint table, as CSV or, by the suffix of its name, as Parquet."""
 
     def __init__(self, file: BinaryIO, name: str, job: Job, oriented: bool = False) -> None:
-        """name: of the file; oriented: of a program with orientation. Raises ConfigError CC216 without pyarrow."""
+        """oriented: of a program with orientation. Raises ConfigError CC216 without pyarrow."""
         kind = ParquetFile if name.endswith(PARQUET) else CsvFile
-        self._table: ParquetFile | CsvFile = kind(file, joint_columns(job, oriented))
+        table: ParquetFile | CsvFile = kind(file, joint_columns(job, oriented))
+        self._rows, self.close = table.rows, table.close
 
     def add(self, rows: JointTableRows) -> None:
         """Adds rows."""
         actuators = np.stack((rows.nominal, rows.joints, rows.drive), axis=2).reshape(len(rows.line), -1)
         behind = [] if rows.behind is None else [rows.behind]
-        values = np.column_stack((rows.s, rows.t, rows.target, rows.written, rows.force, actuators, *behind))
-        self._table.rows(rows.line, values)
-
-    def close(self) -> None:
-        """Writes the end."""
-        self._table.close()
+        self._rows(
+            rows.line, np.column_stack((rows.s, rows.t, rows.target, rows.written, rows.force, actuators, *behind))
+        )
 
 
 class CsvFile:

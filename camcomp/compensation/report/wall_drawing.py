@@ -7,10 +7,9 @@ from pathlib import PurePath
 
 import numpy as np
 
-from camcomp.compensation.program.loaded_cut import loaded_cut, meant_cut, nodes_of
+from camcomp.compensation.program.loaded_cut import loaded_cut, meant_cut, nodes_of, refuse_without_stock
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.errors import ConfigError
 from camcomp.ground.records import dataclass
 from camcomp.model.job import Job
 from camcomp.model.stock.walls import Wall, offsets, walls_of
@@ -132,9 +131,7 @@ def walls_html(job: Job, program: Program, inputs: Sequence[Input]) -> bytes:
 
     Raises ConfigError CC298 without a stock, CC216 when the plot library is not installed.
     """
-    if job.config.workpiece.stock is None:
-        message = "there is no stock that could be cut"
-        raise ConfigError("CC298", message, at=job.config.at("workpiece"), hint="add workpiece: stock")
+    refuse_without_stock(job)
     section = wall_section(job, program, [("as written", program)])
     drawn = section is not None and bool(section.figures)
     lines = int(np.unique(program.path.line).size)
