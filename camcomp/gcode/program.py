@@ -1,5 +1,7 @@
 """Result of reading a program: its path, and the positions of its numbers in the text."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,9 +49,10 @@ class Sites:
     waits_in_line: Bools  # (n,) it waits for words of the line, such as G4, before the motion
     fixed: Bools  # (n,) the line has several motions or no G0..G3: not to be rewritten in place
 
-    def take(self, rows: Ints) -> "Sites":
-        """Those of some of the motions."""
-        return Sites(**{each.name: getattr(self, each.name).take(rows, axis=0) for each in fields(self)})
+    def stretches(self, rows: Sequence[slice]) -> "Sites":
+        """Those of some stretches of the motions, one behind the other."""
+        columns = {each.name: getattr(self, each.name) for each in fields(self)}
+        return Sites(**{name: np.concatenate([column[each] for each in rows]) for name, column in columns.items()})
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,7 @@ class Writer(LineEditor):
 
     def run_part(self, part: Part) -> Standing:
         """Fill `edits` for some motions, and `ends` (N, 3) for all rows; return the state of the controller after them."""
-        bounds = np.searchsorted(self.out.motion, np.arange(len(self.path) + 1))
+        bounds = np.concatenate(([0], np.cumsum(np.bincount(self.out.motion, minlength=len(self.path)))))
         self.ends[:] = self.out.end
         self.lines[:] = 0
         if bounds[part.first]:

@@ -1,16 +1,24 @@
 """Lengths and products of many short vectors, and distinct values."""
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
+
+Kind = TypeVar("Kind", bound=np.generic)
 
 
 def distinct(values: np.ndarray) -> list[Any]:
     """The different values (n,), ascending; unlike numpy's unique without the import of masked arrays."""
     changed = values[1:] != values[:-1]  # most values are those before them
     return sorted({*values[:1].tolist(), *values[1:][changed].tolist()})
+
+
+def chosen(values: NDArray[Kind], on: Bools) -> NDArray[Kind]:
+    """Rows of values (n, ...) that are on (n,): the array itself where all are."""
+    return values if on.all() else values.compress(on, axis=0)
 
 
 def sizes(vectors: Floats) -> Floats:

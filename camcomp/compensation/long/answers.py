@@ -186,31 +186,28 @@ class Near:
     change: Floats  # (e, m) of the set-points by the correction
     nominal: Floats  # (e, m) set-points of the target
 
-    def tips(self, commanded: Floats) -> Floats:
-        """Loaded tips (n, 3) of commanded tips (n, 3), to first order about those that lead to the targets if near them."""
-        off = commanded - self.target - self.correction
-        out = off.copy()
-        follow(self.tiles.slope, self.tile, off, out)
-        out += self.target
-        far = np.flatnonzero(largest(off) > COARSE_MM)
-        if len(far):
-            out[far] = self.answers.solve(FREE, commanded[far], self.force[far], None, tips_only=True).tip
-        return out
+    def response(self, commanded: Floats) -> tuple[Floats, Correction]:
+        """Loaded tips (n, 3) of commanded tips (n, 3), and states (e,) of the machine at the ends.
 
-    def state(self, commanded: Floats) -> Correction:
-        """States of the machine (e,) at the ends, to first order as `tips`."""
-        at = self.ends
-        told, target, correction = (each.take(at, axis=0) for each in (commanded, self.target, self.correction))
-        off = told - target - correction
-        rho, drive = np.zeros(self.nominal.shape), self.drive
-        follow(self.tiles.rates, self.tile[at], off, rho)
+        Both to first order about the commanded tips that lead to the targets, where those are near.
+        """
+        off, at = commanded - self.target - self.correction, self.ends
+        tips, rho, drive = off.copy(), np.zeros(self.nominal.shape), self.drive
+        follow(self.tiles.slope, self.tile, off, tips)
+        follow(self.tiles.rates, self.tile.take(at), off.take(at, axis=0), rho)
+        tips += self.target
         rho += self.nominal + self.change
-        far = np.flatnonzero((self.tile[at] < 0) | (largest(off) > COARSE_MM))
-        if len(far):
-            found = self.answers.solve(FREE, told[far], self.force[at[far]], None)
-            rho[far], drive = found.rho, drive.copy()
-            drive[far] = found.drive
-        return self._as_state(told, rho, drive)
+        far = np.zeros(len(off), np.bool_)
+        if not max(off.max(initial=0.0), -off.min(initial=0.0)) <= COARSE_MM:
+            far = largest(off) > COARSE_MM
+            tips[far] = self.answers.solve(FREE, commanded[far], self.force[far], None, tips_only=True).tip
+        alone = np.flatnonzero((far | (self.tile < 0)).take(at))
+        told = commanded.take(at, axis=0)
+        if len(alone):
+            found = self.answers.solve(FREE, told[alone], self.force[at[alone]], None)
+            rho[alone], drive = found.rho, drive.copy()
+            drive[alone] = found.drive
+        return tips, self._as_state(told, rho, drive)
 
     def programmed(self) -> Correction:
         """States (e,) at the ends when the targets are commanded, without drives and tilt."""

@@ -37,7 +37,7 @@ from camcomp.model.job import Job
 if TYPE_CHECKING:
     from camcomp.model.stock.memory import StockMemory
 
-HASHED = 1 << 22  # bytes at once
+HASHED = 1 << 20  # bytes at once
 LINE_OF_STAMP, LINE_BYTES = 256, 24.0  # bytes; of a stamp at most, of a line of a program about
 NEAR = 1e-3  # mm: only the direction of a neighbour matters, and on which side of the stock's top it is
 
@@ -63,8 +63,10 @@ class LongProgram:
         while block := source.read(HASHED):
             digest.update(block)
             size += len(block)
-            lines += block.count(b"\n")
-            if b"sha256:" in (seen := rest + block) and is_stamped(seen):
+            lines += _count_of(b"\n", block)
+            if (
+                b":" in (seen := rest + block) and b"sha256:" in seen and is_stamped(seen)
+            ):  # a single byte is found faster
                 raise CheckFailed("CC603", f"{self.name} was compensated before")
             rest = block[-LINE_OF_STAMP:]
         source.seek(0)
@@ -91,7 +93,7 @@ class LongProgram:
         self._stamp: str | None = stamp_text(digest.hexdigest(), self.version, self.job.fingerprint)
         with ThreadPoolExecutor(1) as self._beside:
             for data in self._pieces():
-                self.totals.lines_out += data.count(b"\n")
+                self.totals.lines_out += _count_of(b"\n", data)
                 sink(data)
             self._told.result()
         totals, runs = self.totals, self._runs
@@ -219,6 +221,11 @@ class LongProgram:
         self._told = self._beside.submit(tell)
 
 
+def _count_of(byte: bytes, data: bytes) -> int:
+    """How often a byte occurs; for frequent ones faster than `count`."""
+    return int(np.count_nonzero(np.frombuffer(data, np.uint8) == ord(byte)))
+
+
 def _stock_of(job: Job, source: BinaryIO, name: str, setup: Setup) -> StockMemory | None:
     """The stock; the program is read here where it depends on its bounds or tools. None: there is no stock."""
     stock = job.config.workpiece.stock
@@ -256,16 +263,16 @@ class _Piece:
     def between(self, before: _Piece | None, after: _Piece | None) -> Program:
         """Its program with the end of the motion in front of it and the begin of that behind it, which have no words."""
         program, n = self.program, len(self.path)
-        paths, modes, rows = [self.path], program.modes, np.arange(n)
+        paths, modes, rows = [self.path], program.modes, [slice(n)]
         if before is not None:
             paths, modes = [before.last, *paths], (before.program.modes[before.ends[1]], *modes)
-            rows = np.append(0, rows)
+            rows = [slice(1), *rows]
         if after is not None:
             paths, modes = [*paths, after.first], (*modes, after.program.modes[after.ends[0]])
-            rows = np.append(rows, n - 1)
+            rows = [*rows, slice(n - 1, n)]
         shift = int(before is not None)
         return replace(
-            program, path=Path.joined(paths), sites=program.sites.take(rows), modes=modes,
+            program, path=Path.joined(paths), sites=program.sites.stretches(rows), modes=modes,
             rebases=tuple(replace(each, motion=each.motion + shift) for each in program.rebases),
         )  # fmt: skip
 

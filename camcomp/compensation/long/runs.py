@@ -30,6 +30,9 @@ from camcomp.model.control import waiting_s
 
 CHUNK_BYTES = 1 << 21  # bytes read at once
 RUN = 1 << 15  # motions of a linear run at most
+RUN_BYTES = (
+    1 << 20
+)  # of a run, about: so many are read before it is scanned, because one that is cut off is scanned twice
 PROBE_MOTIONS = 48  # linear motions in a row that make a run of their own
 _PROGRAM = re.compile(rb"(?:^|[\r\n])[ \t]*[O:][ \t]*\d", re.IGNORECASE)
 _END = re.compile(END_OF_LINE.encode())
@@ -192,6 +195,8 @@ class Runs:
         state = self._state
         if not is_linear(state):
             return None
+        if limit == RUN and len(self._data) - self._at < RUN_BYTES:
+            self._more()
         room, position, data = LinearMotions.room(limit), np.array(state.position), self._data[self._at :]
         n, rows, end, why, code, feed, coded, fed = scan(
             data, 0, len(data), self._last, motion_number(state), state.feed or 0.0, *self._flags,

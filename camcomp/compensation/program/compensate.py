@@ -52,7 +52,7 @@ from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.progress import part as part_of_work
 from camcomp.ground.records import dataclass, replace
-from camcomp.ground.vectors import largest, largest_of_groups, sizes
+from camcomp.ground.vectors import chosen, largest, largest_of_groups, sizes
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle
 from camcomp.model.cutting.track import Track, lay_track
@@ -330,7 +330,7 @@ class _Correction:
             size = np.maximum(size, np.nan_to_num(after.tilt) * self.goal[points.piece] / MOST_TILT_RAD)
         return Division(
             rows=rows, written=written, points=points, commanded=told, after=after, missed=missed,
-            worst=largest_of_groups(size[points.judged], points.piece[points.judged], len(self.goal)),
+            worst=largest_of_groups(chosen(size, points.judged), chosen(points.piece, points.judged), len(self.goal)),
         )  # fmt: skip
 
     def _rewritten(self, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Rewritten:
@@ -345,11 +345,11 @@ class _Correction:
         """The corrected program, its arcs as arcs or as lines."""
         program, job, track = self.program, self.job, self.track
         found = self._divided(arcs and self.orienting is None)  # a circle of the tip does not turn the tool as needed
-        rows, points, after, judged = found.rows, found.points, found.after, np.flatnonzero(found.points.judged)
+        rows, points, after, judged = found.rows, found.points, found.after, found.points.judged
         with part_of_work(0.8, 1.0, points=True):
             before = see_original(job, points)
         for seen in (after, before):
-            bad = judged[seen.status[judged] != 0]
+            bad = np.flatnonzero(judged & (seen.status != 0))
             refuse_unsolved(program, track, points.piece[bad], points.target[bad], seen.status[bad])
         still = cut_without_spindle(track)
         if len(still):
@@ -366,12 +366,12 @@ class _Correction:
         return Compensated(
             program=program, written=written, rows=rows, s=s, t=times_of(job, program, rows, s), nominal=nominal, state=state,
             force=acting_force(job, state.rho, points.travel, points.end), uncorrected=before.tip,
-            before=before.error.take(judged, axis=0), after=after.error.take(judged, axis=0), control=control, judged=points.row[judged],
+            before=chosen(before.error, judged), after=chosen(after.error, judged), control=control, judged=chosen(points.row, judged),
             iterations=self.aimed.iterations, method=self.method, without_spindle=still, warnings=warnings,
             feeds=int(np.count_nonzero(np.diff(track.motion[self.feeding], prepend=-1))),
             moved=not self.kept[self.feeding].all(), engaged=track.engaged,
-            bands=self._bands(found, before, written), missed=found.missed.take(judged, axis=0),
-            orienting=self.orienting, tilt_after=None if after.tilt is None else after.tilt[judged],
+            bands=self._bands(found, before, written), missed=chosen(found.missed, judged),
+            orienting=self.orienting, tilt_after=None if after.tilt is None else chosen(after.tilt, judged),
             programmed_words=None if self.orienting is None else self.asked.words(rows.piece, rows.w),
         )  # fmt: skip
 

@@ -45,7 +45,8 @@ class JudgedPoints:
         self.fraction = fraction = fraction[order]  # of the move to it, 1 at its end
         self.end = end = fraction == 1.0
         self.piece = piece = rows.piece[row]
-        self.w = np.where(end, rows.w[row], start[row] + fraction * (rows.w - start)[row])
+        self.w = start[row] + fraction * (rows.w - start)[row]
+        self.w[end] = rows.w
         self.target, self.travel = track.points(piece, self.w), asked.travel(piece, self.w)
         self.travel.force[end] = job.frame.vectors(rows.force)  # joining lines know better
         self.judged = cut[row]  # counted in before and after: feed motions, no joining lines
@@ -95,8 +96,8 @@ def see(asked: Programmed, points: JudgedPoints, told: Floats, words: Floats | N
     """The loaded machine at commanded points (k, 3) mm, program frame; words (N, 3): of the orientation at end points."""
     job, orienting = asked.job, asked.orienting
     if points.near is not None:  # of machines that do not turn the tool
-        commanded = job.frame.to_machine(told)
-        state, tip = points.near.state(commanded), job.frame.to_program(points.near.tips(commanded))
+        tip, state = points.near.response(job.frame.to_machine(told))
+        tip = job.frame.to_program(tip)
         return Seen(tip - points.target, points.near.status, tip.compress(points.end, axis=0), state)
     travel, tilt = commanded_travel(points, orienting, words), None
     masses_at = points.target if job.causes or words is not None else None  # masses move with the target

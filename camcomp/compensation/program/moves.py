@@ -12,6 +12,7 @@ from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
 from camcomp.ground.errors import Location, PhysicsError, raise_all
 from camcomp.ground.records import dataclass
+from camcomp.ground.vectors import chosen
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import AROUND_S, Travel
@@ -107,7 +108,8 @@ def without_shared_ends(track: Track, piece: Ints, w: Floats) -> tuple[Ints, Flo
     if len(piece):
         here = piece[1:]
         again[1:] = (w[1:] == 0.0) & (w[:-1] == 1.0) & (here == piece[:-1] + 1) & ~(track.jump | track.corner)[here]
-    return piece[~again], w[~again], np.cumsum(~again) - 1
+    fresh = ~again
+    return chosen(piece, fresh), chosen(w, fresh), np.cumsum(fresh) - 1
 
 
 def travel_of(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:

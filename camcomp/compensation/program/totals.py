@@ -27,7 +27,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.orientation import angles_of
 from camcomp.ground.records import dataclass
 from camcomp.ground.source_lines import MOST_LINES, named_lines
-from camcomp.ground.vectors import distinct, sizes
+from camcomp.ground.vectors import chosen, distinct, sizes
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.cutting.assumed import ForceDoubts
 from camcomp.model.cutting.spindle import spindle_warning
@@ -234,7 +234,7 @@ class Totals:
 
 def _largest(values: Floats, on: Bools) -> Floats:
     """Largest size (m,) in every column of some rows of values (N, m), without NaN; 0 without rows."""
-    return np.array([np.fmax.reduce(np.abs(each[on]), initial=0.0) for each in values.T])
+    return np.array([np.fmax.reduce(np.abs(each), initial=0.0) for each in chosen(values, on).T])
 
 
 def warm_up_warnings(job: Job) -> list[str]:

@@ -20,7 +20,7 @@ from camcomp.gcode.path_mode import PathMode, numbered
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.ground.records import replace
-from camcomp.ground.vectors import largest, sizes
+from camcomp.ground.vectors import chosen, largest, sizes
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves, moves_of
@@ -74,11 +74,11 @@ class UnderControl:
             own, **vars(rows.curves(program.path, written.end, written.centre)), feed=job.conditions.feeds(written.feed),
             exact=own.exact | rest, waits=_waits(program, rows), merge=own.merge if apart is None else np.where(apart, 0.0, own.merge),
         )  # fmt: skip
-        judged = np.flatnonzero(points.judged)
-        row = points.row[judged]
+        judged = points.judged
+        row = chosen(points.row, judged)
         joining = np.concatenate((rows.joining, [False]))
         self.points = PointsOnMoves(
-            move=row, commanded=found.commanded.take(judged, axis=0), error=found.missed.take(judged, axis=0),
+            move=row, commanded=chosen(found.commanded, judged), error=chosen(found.missed, judged),
             line=program.path.line[rows.motion[row]], joined=joining[row - 1] | joining[row + 1],
         )  # fmt: skip
 
