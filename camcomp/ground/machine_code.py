@@ -101,8 +101,9 @@ def find_folder(file: Path) -> Path | None:
         reason = why_folder_is_not_ours(folder)
         if reason is None:
             with suppress(OSError):
-                folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-                if os.access(folder, os.W_OK | os.X_OK) and why_folder_is_not_ours(folder) is None:
+                if fresh := not folder.is_dir():
+                    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+                if os.access(folder, os.W_OK | os.X_OK) and not (fresh and why_folder_is_not_ours(folder)):
                     return folder
         elif given and number == 0:
             note(

@@ -4,7 +4,6 @@
 130 interrupted · 141 the reader of our output went away · 143 ended by SIGTERM, 129 by SIGHUP.
 """
 
-import gc
 import os
 import signal
 import sys
@@ -22,7 +21,6 @@ import click
 from camcomp import __version__
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, PluginWarning, Terminated, format_error, shown
 from camcomp.ground.files import remembering_inputs
-from camcomp.ground.garbage import collect_seldom
 from camcomp.terminal.standard_streams import stand_in_for_closed
 
 # Threads of the linear algebra slow small matrices down, in particular on a busy machine. The variables have to be set
@@ -133,7 +131,6 @@ def _end_on_signals() -> None:
 def main(args: list[str] | None = None) -> None:
     """Run the command line and leave the process with the exit code of the contract."""
     stand_in_for_closed()
-    collect_seldom()
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # saves a search through all installed packages
     _end_on_signals()
     code = run(sys.argv[1:] if args is None else args)
@@ -142,7 +139,6 @@ def main(args: list[str] | None = None) -> None:
             stream.flush()
         except OSError:
             _forget(stream)  # the error was reported when it occurred, or cannot be
-    gc.freeze()  # saves a last garbage collection at exit
     sys.exit(code)
 
 

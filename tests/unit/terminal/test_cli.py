@@ -182,3 +182,13 @@ def test_a_signal_ends_a_command_in_the_middle_and_leaves_nothing(tmp_path, numb
     process.send_signal(number)
     said = process.communicate(timeout=20)[1]
     assert (process.returncode, list(tmp_path.iterdir())) == (code, []) and "Traceback" not in said
+
+
+@pytest.mark.parametrize(("words", "code"), [(["--version"], 0), (["explain", "nothing"], 2)])
+def test_the_end_of_a_process_runs_exit_functions_and_keeps_output_and_code(words, code):
+    script = "import atexit, os; atexit.register(os.write, 2, b'the end')\nfrom camcomp.__main__ import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", script, *words], check=False, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == code and done.stderr.endswith("the end")
+    assert bool(done.stdout) == (code == 0)
