@@ -6,11 +6,10 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from camcomp.diagnosis.recordings.axis_file import read_axis
 from camcomp.diagnosis.recordings.experiment_file import experiment_yaml, run_names
 from camcomp.diagnosis.recordings.formats import read_sampled
 from camcomp.diagnosis.recordings.naming import match_columns
-from camcomp.diagnosis.recordings.run_log import Recording, Wishes, log_of
+from camcomp.diagnosis.recordings.run_log import Recording, Wishes, columns_of_axis, log_of
 from camcomp.diagnosis.recordings.sampled import SampledColumns, refuse_names
 from camcomp.ground.errors import FileError
 from camcomp.ground.files import display_name, read_bytes, write_all
@@ -35,21 +34,12 @@ def import_recordings(
     told = match_columns(columns, list(actuators), [each.rotary for each in actuators.values()])
     recordings = list[Recording]()
     for run, group in steps(zip(called, groups, strict=True), len(groups)):
+        parts = _parts(group, [each.split() for each in names], period_s)
         wishes = Wishes(
-            columns=told, rows=rows, degrees=degrees, period_s=period_s, join=by, program=run in run_programs
-        )
-        if len(group) == 1 and Path(group[0]).suffix.lower() == ".mat":
-            read = read_axis(
-                data=read_bytes(group[0]),
-                file=display_name(group[0]),
-                name=run,
-                actuators=actuators,
-                actuator=actuator,
-                wishes=wishes,
-            )
-        else:
-            read = log_of(run, _parts(group, [each.split() for each in names], period_s), actuators, wishes)
-        recordings.append(read)
+            columns=columns_of_axis(parts, actuators, actuator) | told, rows=rows, degrees=degrees, period_s=period_s,
+            join=by, program=run in run_programs,
+        )  # fmt: skip
+        recordings.append(log_of(run, parts, actuators, wishes))
     out = Path(output_dir)
     outputs: dict[Path, bytes] = {out / f"{each.name}.csv": each.log for each in recordings}
     outputs[out / "experiment.yaml"] = experiment_yaml(

@@ -610,9 +610,9 @@ RULES: dict[str, Rule] = {
         "delete units and words; write dates as 2022-10-11 or 11.10.2022",
     ),
     "CC423": Rule(
-        "recording not readable",
-        "A recording of one axis is a MATLAB file with t in s, qg and qm in m and, for forces, vir and gtau.",
-        "write a log CSV instead: t_s, cmd_x_mm, act_x_mm, act_x_N",
+        "axis of a recording",
+        "A MATLAB file of one axis, with t in s, qg and qm in m and, for forces, vir and gtau, belongs to an axis of the machine.",
+        "--actuator names one of the machine's",
     ),
     "CC424": Rule(
         "name of a run",

@@ -6,6 +6,7 @@ from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Sequence
 from pathlib import Path
 
+from camcomp.diagnosis.recordings.mat_file import read_matlab
 from camcomp.diagnosis.recordings.mcap_file import read_mcap
 from camcomp.diagnosis.recordings.sampled import SampledColumns
 from camcomp.diagnosis.recordings.tables import read_text_table
@@ -32,6 +33,8 @@ def read_sampled(
     suffix, at = Path(file).suffix.lower(), Location(file, 1, 1)
     if suffix in _ELSEWHERE:
         raise ConfigError("CC452", f"{suffix} files are not read", at=at, hint=_ELSEWHERE[suffix])
+    if suffix == ".mat":
+        return read_matlab(data, file)
     if suffix == ".mcap" or data.startswith(_MCAP):
         return read_mcap(data, file)
     if suffix == ".tdms" or data.startswith(_TDMS):

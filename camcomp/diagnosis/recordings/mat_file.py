@@ -12,11 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.diagnosis.recordings.sampled import SampledColumns, of_values, reading, some
 from camcomp.ground.csv_table import MOST_TABLE_BYTES
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import ConfigError, Location
 
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _HDF5 = b"MATLAB 7.3"
+OF_AXIS = ("qg", "qm", "vir")  # set-points and encoder of one axis, m, and its drive signal, N by its factor gtau
+_UNITS = {"t": "s", "qg": "m", "qm": "m", "vir": "N"}
 
 
 @dataclass(frozen=True)
@@ -25,6 +29,25 @@ class _Element:
 
     kind: int
     data: memoryview
+
+
+def read_matlab(data: bytes, name: str) -> list[SampledColumns]:
+    """The variables as long as the longest, those of the EMPS benchmark with their units. Raises ConfigError CC452."""
+    with reading(name, "a MATLAB file"):
+        found = read_mat(data)
+    rows = max(map(len, found.values()), default=0)
+    if not rows:
+        raise ConfigError("CC452", "the file has no variables with numbers", at=Location(name, 1, 1))
+    columns = {key: values for key, values in found.items() if len(values) == rows}
+    factor = found.get("gtau", np.zeros(0))
+    if factor.size == 1:
+        columns = {key: values * factor if key == "vir" else values for key, values in columns.items()}
+    else:
+        columns.pop("vir", None)
+    dropped = sorted(set(found) - set(columns) - {"gtau"})
+    notes = [f"variables dropped: {some(dropped)}"] if dropped else []
+    units = [_UNITS.get(key, "") for key in columns]
+    return [of_values(name, list(columns), units, list(columns.values()), time=None, notes=notes)]
 
 
 def read_mat(data: bytes) -> dict[str, Floats]:

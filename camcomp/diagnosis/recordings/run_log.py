@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from camcomp.diagnosis.recordings.joining import SampledTable, join
+from camcomp.diagnosis.recordings.mat_file import OF_AXIS
 from camcomp.diagnosis.recordings.naming import (
     Pick,
     Picked,
@@ -51,6 +52,22 @@ class Wishes:
     period_s: float | None = None
     join: str | None = None
     program: bool = False
+
+
+def columns_of_axis(sampled: Sequence[SampledColumns], actuators: Actuators, actuator: str | None) -> dict[str, str]:
+    """Variables of a recording of one axis by the log's columns of an actuator, the first by default; no names of other recordings.
+
+    Raises ConfigError CC423.
+    """
+    there = {name for part in sampled for name in part.names}
+    if not there.issuperset(OF_AXIS[:2]):
+        return {}
+    target = actuator or next(iter(actuators))
+    if target not in actuators:
+        raise ConfigError("CC423", f"the machine has no actuator '{target}'", at=sampled[0].at(-1, 0))
+    named = log_columns([target], [actuators[target].rotary])
+    logs = (*named.setpoint, *named.encoder, *named.drive)
+    return {log: theirs for log, theirs in zip(logs, OF_AXIS, strict=True) if theirs in there}
 
 
 def log_of(name: str, sampled: Sequence[SampledColumns], actuators: Actuators, wishes: Wishes) -> Recording:

@@ -296,7 +296,9 @@ def test_an_axis_recording_that_lacks_something_is_refused(read):
     buffer = io.BytesIO()
     savemat(buffer, {"t": np.arange(5.0), "qg": np.arange(5.0)})
     got = read(buffer.getvalue(), name="axis.mat", config="cartesian")
-    assert got.code == 2 and "CC423" in got.told and "no variable qm" in got.told
+    assert got.code == 2 and "CC421" in got.told and "there are: t, qg" in got.told
+    savemat(buffer := io.BytesIO(), {"t": np.arange(5.0), "qg": np.arange(5.0), "qm": np.arange(5.0)})
+    assert "CC423" in read(buffer.getvalue(), "--actuator", "v", name="axis.mat", config="cartesian").told
     assert "not a MATLAB file" in read(b"nonsense", name="axis.mat", config="cartesian").told
 
 
@@ -305,8 +307,20 @@ def test_an_axis_recording_s_rows_and_variables_that_are_dropped_are_said(read):
     t = np.arange(20.0)
     savemat(buffer, {"t": t, "qg": t, "qm": t, "noise": t})
     got = read(buffer.getvalue(), "--rows", "12", name="axis.mat", config="cartesian")
-    assert list(got.logs["axis"]["act_x_mm"]) == list(1000 * t[:12])
-    assert "variables dropped: noise" in got.told and "8 dropped" in got.told
+    log = got.logs["axis"]
+    assert len(log["t_s"]) == 12 and list(log["act_x_mm"]) == list(1000 * log["t_s"]) and log["t_s"][-1] == 19.0
+    assert "1 column dropped: noise" in got.told and "8 dropped" in got.told
+
+
+def test_variables_of_any_matlab_file_are_columns_by_the_names_that_are_told(read):
+    savemat(
+        buffer := io.BytesIO(),
+        {"clock": np.arange(5.0), "ask": np.arange(5.0), "got": 2.0 * np.arange(5.0), "one": 1.0},
+    )
+    told = [word for each in ("t_s=clock", "cmd_y_mm=ask", "act_y_mm=got") for word in ("--column", each)]
+    got = read(buffer.getvalue(), *told, name="axis.mat", config="cartesian")
+    assert got.code == 0 and list(got.logs["axis"]["act_y_mm"]) == [0.0, 2.0, 4.0, 6.0, 8.0]
+    assert "variables dropped: one" in got.told
 
 
 def test_runs_are_called_by_their_files_and_each_name_is_there_once(tmp_path, capsys):
