@@ -15,18 +15,19 @@ from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.findings import AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import STRETCH_S
 from camcomp.diagnosis.axis.plausible import MIDDLE
-from camcomp.diagnosis.axis.surroundings import POSES
 from camcomp.diagnosis.axis.terms import travel
 from camcomp.diagnosis.model.design import designed
 from camcomp.diagnosis.model.discrepancy import smooth_functions
 from camcomp.diagnosis.next_experiment.design import SETUP_MIN
 from camcomp.diagnosis.result.types import UNKNOWN, AxisMoves, NextExperiment, StrokeBlock
 from camcomp.ground.datatypes import Floats
+from camcomp.model.motion.timeline import trapezoid, trapezoid_duration
 
 BLOCKS = 4  # of a proposal
 BLOCK_S = 60.0  # of strokes, one there and back at least: four minutes of a proposal
 LENGTHS = (1.0, 0.3, 0.05)  # of the travel that the runs had
 SPEEDS = (0.05, 0.2, 0.5, 1.0)  # of the speed that they had
+ROWS_OF_BLOCK = 400  # of a block of strokes whose functions are worked out
 REST_S = 0.2  # at either end of a stroke
 _MEANS = {
     "position": "If what is left of {0} is the same at the same place in every stroke, it goes with the position: screw, scale or guide.",
@@ -108,7 +109,7 @@ def _functions(moves: AxisMoves, ends: Sequence[tuple[float, float]]) -> Floats:
     """Functions (n, k) of position, speed and acceleration of strokes, one floor in size; a stretch of time counts once."""
     time, place = set_points(moves)
     speed = np.gradient(place, time)
-    some = np.linspace(0, len(time) - 1, POSES).astype(int)
+    some = np.linspace(0, len(time) - 1, ROWS_OF_BLOCK).astype(int)
     motion = place, speed, np.gradient(speed, time)
     each = [smooth_functions(values[some], *own) for values, own in zip(motion, ends, strict=True)]
     return np.asarray(np.hstack(each) * np.sqrt(time[-1] / STRETCH_S / len(some)), float)
@@ -131,14 +132,9 @@ def _way(start: float, end: float, speed: float, acceleration: float, step: floa
     length = abs(end - start)
     if length == 0.0:
         return np.zeros(0)
-    speed = min(speed, float(np.sqrt(length * acceleration)))
-    ramp = speed / acceleration
-    whole = length / speed + ramp
+    whole = float(trapezoid_duration(length, speed, acceleration))
     t = np.append(np.arange(0.0, whole, step), whole)
-    up, down = np.minimum(t, ramp), np.minimum(whole - t, ramp)
-    steady = np.clip(t - ramp, 0.0, whole - 2.0 * ramp)
-    way = 0.5 * acceleration * (up**2 + ramp**2 - down**2) + speed * steady
-    return np.asarray(start + np.sign(end - start) * way)
+    return np.asarray(start + np.sign(end - start) * trapezoid(t, whole, length, speed, acceleration))
 
 
 def _tidy(value: float) -> float:

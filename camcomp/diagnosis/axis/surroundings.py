@@ -1,5 +1,5 @@
 """The machine around an axis: loads on its drive, columns of the bodies behind it, effects that its file states, motion of other
-axes, and dx = J(q) e at the tip.
+axes, and how far their errors move the tip.
 """
 
 from __future__ import annotations
@@ -18,12 +18,10 @@ from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground.datatypes import STANDARD_GRAVITY, Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause
-from camcomp.model.statics.arm import ARM_LENGTH, arm_of, end_pose, jacobian
+from camcomp.model.statics.arm import ARM_LENGTH, arm_of
 from camcomp.model.statics.description import Actuator, Robot
 from camcomp.model.statics.hanging import hang, tool_wrench
 from camcomp.model.statics.masses import has_moved_mass, mass_loads
-
-POSES = 400  # of a run or a proposed motion that are worked out; between them all is straight
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,17 +125,17 @@ class AxisSurroundings:
     def errors(self, run: str, errors: Errors) -> Floats:
         """Distances (n,) mm of the tip in a run, at the times of the axis with the most rows."""
         time = max((t for t, _ in errors.values()), key=len)
-        rates = self._rates(run, time)
         own = np.column_stack([
             np.interp(time, *errors[name]) / lever_mm(hinge) if name in errors else np.zeros(len(time))
             for name, hinge in self._actuators
         ])  # fmt: skip
-        return np.asarray(np.sqrt(np.sum(np.einsum("nij,nj->ni", rates, own) ** 2, axis=1)))
+        return self._way_of_tip(run, time, own)
 
     def floor(self, run: str, time: Floats, floors: Mapping[str, float]) -> Floats:
         """Standard deviations (n,) mm of the tip, of floors by axis."""
         each = np.array([floors.get(name, 0.0) / lever_mm(hinge) for name, hinge in self._actuators])
-        return np.asarray(np.sqrt(np.sum((self._rates(run, time) * each) ** 2, axis=(1, 2))))
+        ways = [self._way_of_tip(run, time, np.tile(one, (len(time), 1))) for one in np.diag(each)[each > 0.0]]
+        return np.asarray(np.sqrt(np.sum(np.square([np.zeros(len(time)), *ways]), axis=0)))
 
     @property
     def _actuators(self) -> list[tuple[str, bool]]:
@@ -146,18 +144,14 @@ class AxisSurroundings:
             return [(name, any(r.revolute for r in runs)) for name, runs in self.axes.items()]
         return [(a.name, a.revolute) for a in self.robot.actuators]
 
-    def _rates(self, run: str, time: Floats) -> Floats:
-        """Motion (n, i, m) of the tip per unit of every actuator; a slide of a machine that is no arm moves it by its own error."""
-        arm, m = None if self.robot is None else arm_of(self.robot), len(self._actuators)
-        if arm is None or self.robot is None:
-            return np.broadcast_to(np.eye(m), (len(time), m, m))
-        at = np.unique(np.linspace(0, len(time) - 1, min(POSES, len(time))).round().astype(int))
-        rates = []
-        for q in self.coordinates(run, time[at]):
-            twist, (rotation, _) = jacobian(arm, q), end_pose(arm, q)
-            rates.append(twist[:3] + np.cross(twist[3:].T, rotation @ self.robot.tool).T)
-        out = np.empty((len(time), 3, m))
-        for i in range(3):
-            for j in range(m):
-                out[:, i, j] = np.interp(time, time[at], [each[i, j] for each in rates])
-        return out
+    def _way_of_tip(self, run: str, time: Floats, by: Floats) -> Floats:
+        """Distances (n,) mm by which errors (n, m) of all actuators move the tip; a slide of a machine that is no arm moves it by
+        its own error.
+        """
+        if self.robot is None or arm_of(self.robot) is None:
+            return np.asarray(np.linalg.norm(by, axis=1))
+        q = self.coordinates(run, time)
+        here, there = (
+            hung.point + hung.rotation @ self.robot.tool for hung in (hang(self.robot, q), hang(self.robot, q + by))
+        )
+        return np.asarray(np.linalg.norm(there - here, axis=1))

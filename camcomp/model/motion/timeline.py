@@ -42,17 +42,20 @@ class Timeline:
         spent = np.clip(time - self.start[k], 0.0, self.duration[k])
         with np.errstate(invalid="ignore", divide="ignore"):
             t = np.where(self.duration[k] > 0, spent * natural / self.duration[k], 0.0)
-            done = _trapezoid(t, natural, self.length[k], self.feed[k], self.acceleration)
+            done = trapezoid(t, natural, self.length[k], self.feed[k], self.acceleration)
             return np.where(self.length[k] > 0, np.clip(done / self.length[k], 0.0, 1.0), 1.0)
 
 
-def trapezoid_duration(length: Floats, feed: Floats, acceleration: float) -> Floats:
+def trapezoid_duration(length: Floats | float, feed: Floats | float, acceleration: float) -> Floats:
     """Time (n,) s for length mm from stop to stop at feed mm/s with acceleration mm/s2."""
     cruise = length / feed + feed / acceleration
     return np.where(length * acceleration >= feed**2, cruise, 2.0 * np.sqrt(length / acceleration))
 
 
-def _trapezoid(t: Floats, duration: Floats, length: Floats, feed: Floats, acceleration: float) -> Floats:
+def trapezoid(
+    t: Floats, duration: Floats | float, length: Floats | float, feed: Floats | float, acceleration: float
+) -> Floats:
+    """Length (n,) mm done t (n,) s after a stop, of lengths that take durations from stop to stop."""
     peak = np.minimum(feed, np.sqrt(length * acceleration))
     ramp = peak / acceleration
     left = np.maximum(duration - t, 0.0)
