@@ -94,10 +94,7 @@ def _step(time: Floats) -> float:
 
 
 def _nearest(time: Floats, wanted: Floats) -> Ints:
-    right = np.clip(np.searchsorted(time, wanted), 1, max(len(time) - 1, 1))
-    right = np.minimum(right, len(time) - 1)
-    left = np.maximum(right - 1, 0)
-    return np.where(wanted - time[left] <= time[right] - wanted, left, right)
+    return np.ceil(np.interp(wanted, time, np.arange(len(time))) - 0.5).astype(np.int64)
 
 
 def _between(time: Floats, values: Floats, wanted: Floats, held: bool) -> Floats:
