@@ -11,7 +11,9 @@ import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.evidence import FREE, within
+from camcomp.diagnosis.statistics.evidence import FREE, gram, within
+from camcomp.diagnosis.statistics.normal_equations import sum_grams
+from camcomp.diagnosis.statistics.posterior import AmplitudePosterior
 from camcomp.ground.datatypes import Floats
 
 FORMULA = 0.005  # share of its size by which an effect's formula itself is off: no guide turns round as Dahl wrote
@@ -32,26 +34,25 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
     usual, most = _stated(problem)
     precision = np.concatenate([usual, np.ones(s)])
     precision[index] = FREE
-    M = sum((g.T @ g for g in G), np.diag(precision))
-    size = 1.0 / np.sqrt(np.diag(M))
-    C = size[:, None] * np.linalg.inv(size[:, None] * M * size) * size
+    all_columns = AmplitudePosterior.of(sum_grams([gram(g, r) for g, r in zip(G, f.residual, strict=True)]), precision)
     most = np.concatenate([most, np.full(s, np.inf)])
     most[index] = np.inf
-    mean = within(C @ sum(g.T @ r for g, r in zip(G, f.residual, strict=True)), lambda held: C[:, held], most)[0]
+    mean = within(all_columns.mean, all_columns.across, most)[0]
     mine = np.array([*index, *range(k, k + s)], int)
+    C = all_columns.across(mine)
     scatter = np.zeros((len(BLOCKS), d + s))
     for run, (g, r) in enumerate(zip(G, f.residual, strict=True)):
-        pull = (g @ C[:, mine]) * (r - g @ mean)[:, None]
+        pull = (g @ C) * (r - g @ mean)[:, None]
         at = problem.row_places(run)
         for b, count in enumerate(BLOCKS):
             block = np.minimum((at * count).astype(int), count - 1)
             sums = np.zeros((count, d + s))
             np.add.at(sums, block, pull)
             scatter[b] += np.sum(sums**2, axis=0)
-    own = np.diag(C)[mine]
+    own = np.diag(C[mine])
     wider = np.sqrt(np.maximum(scatter.max(axis=0) / own, 1.0))
     unit = np.concatenate([np.ones(d), reach])
-    out = C[np.ix_(mine, mine)] * np.outer(wider * unit, wider * unit)
+    out = C[mine] * np.outer(wider * unit, wider * unit)
     healthy = np.concatenate(
         [problem.prior.tolerance[index], [p.tolerance * (f.extra[i][p.name] if p.log else 1.0) for i, p in names]]
     )

@@ -182,10 +182,10 @@ class Problem:
             white = [self._stacked(k, [m[k] for m in moved], index) for k in range(len(self.bench.runs))]
             left = [r + W @ theta for r, W in zip(now, white, strict=True)]
             grams = self._grams_at(index, white, left)
-            mean, full = estimate(sum_grams(grams), self.prior, index)
+            mean, covariance = estimate(sum_grams(grams), self.prior, index)
             after = self._bounded(members, mean[index])
             change, theta = after - theta, after
-            size = float(change @ np.linalg.solve(full[np.ix_(index, index)] + 1e-18 * np.eye(len(index)), change))
+            size = float(change @ np.linalg.solve(covariance + 1e-18 * np.eye(len(index)), change))
             if self.shapes_of(members) and (step < passes - 1 or (far and step < most - 1)):
                 size, far = self._move_shapes(
                     members=members, theta=theta, shapes=shapes, left=left, white=white, mean=mean
@@ -199,10 +199,9 @@ class Problem:
             both = [np.column_stack([own, self._pushed(k, farther)]) for k, own in enumerate(white)]
             grams = self._grams_at([*index, *pushed], both, left)
         scale = Scale(sum_grams(grams), self.prior, self.candidates)
-        mean, full = estimate(sum_grams(grams), self.prior, index)
-        theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
+        mean, covariance = estimate(sum_grams(grams), self.prior, index)
         return Fitted(
-            members=members, theta=theta, covariance=covariance, log_evidence=scale(members), grams=grams,
+            members=members, theta=self._bounded(members, mean[index]), covariance=covariance, log_evidence=scale(members), grams=grams,
             extra=shapes, white=tuple(white), residual=tuple(left), farther=farther,
         )  # fmt: skip
 
@@ -249,7 +248,7 @@ class Problem:
             here = np.array([at.index(c) for c in index], int)
             return f.theta[here], np.sqrt(np.diag(f.covariance))[here]
         mean, covariance = estimate(f.without(k), self.prior, index)
-        return self._bounded(members, mean[index]), np.sqrt(np.diag(covariance)[index])
+        return self._bounded(members, mean[index]), np.sqrt(np.diag(covariance))
 
     def _stacked(self, k: int, moved: Sequence[Floats | None], index: Sequence[int]) -> Floats:
         """White columns (w, d) of run k: those that were worked out anew, and the nominal ones of the others."""

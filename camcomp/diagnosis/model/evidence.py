@@ -15,7 +15,6 @@ from functools import cached_property
 from math import comb, log
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 from scipy.special import log_ndtr
 
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
@@ -28,6 +27,7 @@ from camcomp.diagnosis.model.group import (
 from camcomp.diagnosis.model.noise import HEALTHY
 from camcomp.diagnosis.statistics.cause_sets import SIZES
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
+from camcomp.diagnosis.statistics.posterior import AmplitudePosterior, weigh
 from camcomp.ground.datatypes import Floats, Ints
 
 WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: effect of a cause on the channels
@@ -210,60 +210,6 @@ class LinearModel:
         return self._reduced[background]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class AmplitudePosterior:
-    """Columns `live` under their priors: mean (q,), 0 where a column takes no part, and log evidence of the data."""
-
-    data: NormalEquations
-    live: Ints
-    noise: float  # factor on the noise of the data
-    scale: Floats  # (live,) that make the precision's diagonal 1
-    factor: tuple[Floats, bool]  # of the scaled precision
-    mean: Floats
-    log_evidence: float
-
-    @staticmethod
-    def of(data: NormalEquations, precision: Floats, live: Ints, noise: float = 1.0) -> AmplitudePosterior:
-        """From normal equations and prior precisions (q,); noise: factor on the noise."""
-        square = noise**2
-        A, own = data.A[np.ix_(live, live)] / square, precision[live]
-        scale = 1.0 / np.sqrt(np.diag(A) + own)
-        factor = cho_factor(scale[:, None] * (A + np.diag(own)) * scale, lower=True)
-        b = scale * data.b[live] / square
-        solved = cho_solve(factor, b)
-        mean = np.zeros(len(precision))
-        mean[live] = scale * solved
-        value = -0.5 * (data.c / square - float(b @ solved)) - data.log_size - data.rows * log(noise)
-        value -= float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum() - 0.5 * np.log(own).sum())
-        return AmplitudePosterior(
-            data=data, live=live, noise=noise, scale=scale, factor=factor, mean=mean, log_evidence=value
-        )
-
-    def covariance(self, columns: Sequence[int]) -> Floats:
-        """Covariance (d, d) of some of the live columns."""
-        at = np.searchsorted(self.live, columns)
-        right = np.zeros((len(self.live), len(at)))
-        right[at, np.arange(len(at))] = 1.0
-        own = cho_solve(self.factor, right)[at]
-        return np.asarray(self.scale[at][:, None] * own * self.scale[at], float)
-
-    def blocks_without(self, blocks: Sequence[Ints]) -> list[tuple[Floats, Floats]]:
-        """Normal equations of several groups of further columns, each alone, with all live ones integrated out."""
-        if not blocks:
-            return []
-        square = self.noise**2
-        columns = np.concatenate(list(blocks))
-        left = self.scale[:, None] * self.data.A[np.ix_(self.live, columns)] / square
-        solved = cho_solve(self.factor, left)
-        moment = self.data.b[columns] / square - left.T @ (self.mean[self.live] / self.scale)
-        out, start = [], 0
-        for own in blocks:
-            at = slice(start, start := start + len(own))
-            gram = self.data.A[np.ix_(own, own)] / square - left[:, at].T @ solved[:, at]
-            out.append((gram, moment[at]))
-        return out
-
-
 @dataclass(frozen=True, eq=False)
 class Reduced:
     """Normal equations of the effects (gram (k, k), moment (k,)), and the log evidence of no cause at all."""
@@ -340,38 +286,13 @@ class Reduced:
         return dict(zip(self.indices(members), (width * self.units(members)).tolist(), strict=True))
 
     def _posterior(self, members: Members, more: Sequence[int]) -> tuple[Floats, Floats]:
-        """Log evidence (s, widths) and amplitudes (s, widths, d) of a set with one of s candidates more, each of e columns.
-
-        The columns of the set are eliminated once.
-        """
+        """Log evidence (s, widths) and amplitudes (s, widths, d) of a set with one of s candidates more, each of e columns."""
         old, new = np.array(self.indices(members), int), np.array([self.model.candidates[i].columns for i in more])
-        a, b = self.units(members), np.array([self._unit[i] for i in more])
-        square = np.array(WIDTHS) ** 2
-        A = a[:, None] * self.gram[np.ix_(old, old)] * a + np.eye(len(a)) / square[:, None, None]  # (widths, o, o)
-        B = a[:, None] * self.gram[old[:, None], new[:, None, :]] * b[:, None, :]  # (s, o, e)
-        C = b[:, :, None] * self.gram[new[:, :, None], new[:, None, :]] * b[:, None, :]
-        P = np.linalg.inv(A)
-        alone = P @ (a * self.moment[old])  # (widths, o)
-        taken = np.einsum("wop,spe->swoe", P, B, optimize=True)
-        S = C[:, None] + np.eye(b.shape[1]) / square[:, None, None]
-        S = S - np.einsum("soe,swof->swef", B, taken, optimize=True)
-        Q = np.linalg.inv(S)
-        left = (b * self.moment[new])[:, None] - np.einsum("soe,wo->swe", B, alone, optimize=True)
-        gained = (Q @ left[..., None])[..., 0]
-        value = 0.5 * ((alone @ (a * self.moment[old]))[None] + (left * gained).sum(axis=2))
-        value -= 0.5 * (np.linalg.slogdet(A)[1] + np.linalg.slogdet(S)[1] + (len(a) + b.shape[1]) * np.log(square))
-        mean = np.concatenate([alone[None] - (taken @ gained[..., None])[..., 0], gained], axis=2)
-        variance = np.concatenate(
-            [
-                np.diagonal(P, axis1=1, axis2=2)[None] + ((taken @ Q) * taken).sum(axis=3),
-                np.diagonal(Q, axis1=2, axis2=3),
-            ],
-            axis=2,
-        )
+        units = self.units(members), np.array([self._unit[i] for i in more])[:, None]
+        sizes = np.outer(WIDTHS, units[0]), np.array(WIDTHS)[:, None] * units[1]
+        common, own, mean, sd = weigh(self.gram, self.moment, (old, new), sizes)
         on = np.concatenate([np.broadcast_to(old, (len(new), len(old))), new], axis=1)[:, None, :]
-        unit = np.concatenate([np.broadcast_to(a, (len(b), len(a))), b], axis=1)[:, None, :]
-        mean, sd = unit * mean, unit * np.sqrt(np.maximum(variance, 0.0))
-        return value + self._inside(mean, sd, on), mean
+        return common + own + self._inside(mean, sd, on), mean
 
     def _inside(self, mean: Floats, sd: Floats, on: np.ndarray) -> Floats:
         """Log share (s, widths) of the posterior that has the right signs; minus infinity far outside of the bounds."""

@@ -22,7 +22,7 @@ from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.site import Site, site_of
 from camcomp.diagnosis.result.types import NamedCause
 from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.evidence import estimate
+from camcomp.diagnosis.statistics.evidence import estimate, posterior
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import CamcompError
@@ -60,7 +60,8 @@ class Question:
         out = []
         for f in self.rivals:
             index = self.problem.member_columns(f.members)
-            mean, covariance = estimate(f.data, self.problem.prior, index)
+            mean = estimate(f.data, self.problem.prior, index)[0]
+            covariance = posterior(f.data, self.problem.prior, index).across(np.arange(len(mean)))
             mean[index] = 0.0
             covariance[index, index] += (HIDDEN / LARGE * f.theta) ** 2
             out.append((mean, covariance))

@@ -27,8 +27,7 @@ from camcomp.diagnosis.model.discrepancy import UNKNOWN, gains_at_scales
 from camcomp.diagnosis.model.imitation import probability_with_unmodelled
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.search.unknown import joint_products, process_in_time
-from camcomp.diagnosis.statistics.cause_sets import Fitted, parts_of
-from camcomp.diagnosis.statistics.evidence import base, holding_back, log_bayes
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Scale, parts_of
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.diagnosis.statistics.probability import TEMPERATURE
 from camcomp.diagnosis.statistics.score_test import products_of_effect, projected
@@ -80,11 +79,9 @@ class _Hypothesis:
 
 def _alone(problem: Problem, f: Fitted, data: NormalEquations, prior: float) -> list[_Hypothesis]:
     """Every part of a set by normal equations; prior: log prior of what these hold beside the set."""
-    at, columns = base(data, problem.prior), problem.candidates.columns
-    out = []
+    scale, out = Scale(data, problem.prior, problem.candidates), []
     for some in parts_of(f.members):
-        value = at.log_evidence - holding_back(at, problem.prior, problem.member_columns(some))
-        value += float(log_bayes(at, problem.prior, [[columns[i] for i in some]])[0])
+        value = scale.none(some) + scale.worth([(i,) for i in some])
         there = tuple(float(i in some) for i in f.members)
         out.append(_Hypothesis(value, problem.candidates.prior(some) + prior, there))
     return out

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from camcomp.diagnosis.statistics.cause_sets import (
     Scale,
     scored,
 )
-from camcomp.diagnosis.statistics.evidence import estimate, freed, log_bayes
+from camcomp.diagnosis.statistics.evidence import estimate, log_bayes
 from camcomp.diagnosis.statistics.normal_equations import sum_grams
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground import progress
@@ -37,19 +38,25 @@ class LinearSets:
     usable: Sequence[int]
     candidates: Sequence[PlacedCause]
 
+    @cached_property
+    def _equations(self) -> tuple[Floats, Floats]:
+        """Normal equations of all columns' amplitudes, with all small errors integrated out."""
+        return self.scale.at.blocks_without([np.arange(len(self.scale.at.mean))])[0]
+
     def value(self, members: Members) -> float:
         """Log evidence plus log prior."""
-        at, columns = self.scale.base, self.scale.candidates.columns
-        causes = [columns[i] for i in members]
-        more = float(log_bayes(at, self.scale.prior, [causes])[0]) if causes else 0.0
-        return at.log_evidence + more + self.scale.candidates.prior(members)
+        scale = self.scale
+        return scale.at.log_evidence + scale.worth([(i,) for i in members]) + scale.candidates.prior(members)
 
     def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
         """The same (m,) of a set with one of `more` each, the set's own amplitudes free; -inf where two exclude each other."""
-        scale, known = self.scale, self.scale.candidates
-        own = [c for i in members for c in known.columns[i]]
-        at = freed(scale.base, own) if own else scale.base
-        gains = log_bayes(at, scale.prior, [[known.columns[i]] for i in more])
+        known = self.scale.candidates
+        own, columns = [c for i in members for c in known.columns[i]], [known.columns[i] for i in more]
+        gains, count = np.zeros(len(more)), np.array([len(each) for each in columns])
+        for d in np.unique(count):
+            at = np.flatnonzero(count == d)
+            index = np.array([columns[i] for i in at.tolist()])
+            gains[at] = log_bayes(self._equations, self.scale.prior.sign, index, np.zeros(d, int), own)
         gains += [known.prior(tuple(sorted((*members, i)))) for i in more]
         gains[[any(known.exclusive(i, j) for j in members) for i in more]] = -np.inf
         return np.asarray(gains + self.value(members) - known.prior(members), float)

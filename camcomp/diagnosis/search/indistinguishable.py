@@ -13,14 +13,15 @@ from scipy.linalg import eigh
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import HIDDEN, LARGE
-from camcomp.diagnosis.statistics.evidence import FREE, base
+from camcomp.diagnosis.statistics.evidence import FREE, posterior
 from camcomp.diagnosis.statistics.normal_equations import sum_grams
 
 
 def classes(problem: Problem) -> list[tuple[int, ...]]:
     """Candidates that share a signature, in groups of two and more."""
     data, candidates = sum_grams(problem.base_grams), problem.candidates
-    within, columns = base(data, problem.prior), candidates.columns
+    columns, narrow = candidates.columns, problem.prior.precision
+    covariance = posterior(data, problem.prior).across(np.arange(len(narrow)))
 
     def apart(i: int, free: Sequence[int]) -> float:
         """Distance, in units of the noise, of candidate i at `LARGE` times the noise from the best fit of the candidates `free`.
@@ -28,7 +29,7 @@ def classes(problem: Problem) -> list[tuple[int, ...]]:
         Of its parameters that direction counts which keeps least.
         """
         index, d = [*columns[i], *(c for each in free for c in columns[each])], len(columns[i])
-        known = np.linalg.inv(within.covariance[np.ix_(index, index)]) - np.diag(within.precision[index])
+        known = np.linalg.inv(covariance[np.ix_(index, index)]) - np.diag(narrow[index])
         known[d:, d:] += FREE * np.eye(len(index) - d)
         left = known[:d, :d] - known[:d, d:] @ np.linalg.solve(known[d:, d:], known[d:, :d])
         own = data.A[np.ix_(index[:d], index[:d])]

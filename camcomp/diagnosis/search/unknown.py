@@ -167,7 +167,7 @@ def _left_unseen(problem: Problem, f: Fitted, members: Members) -> Floats:
         mean, covariance = estimate(f.without(k), problem.prior, index)
         own = mean[index]
         A, b = g.A[np.ix_(index, index)], g.b[index]
-        square = own @ A @ own - 2.0 * b @ own - float(np.sum(A * covariance[np.ix_(index, index)]))
+        square = own @ A @ own - 2.0 * b @ own - float(np.sum(A * covariance))
         toward = g.b[free] - g.A[free][:, index] @ own
         square -= toward @ np.linalg.lstsq(g.A[np.ix_(free, free)], toward, rcond=1e-12)[0]
         out.append((g.c + square) / g.rows)

@@ -13,11 +13,11 @@ import numpy as np
 
 from camcomp.diagnosis.statistics.evidence import (
     Prior,
-    base,
     holding_back,
     log_bayes,
     log_sum,
     misfit,
+    posterior,
 )
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
 from camcomp.diagnosis.statistics.probability import EVEN, TEMPERATURE
@@ -125,22 +125,32 @@ def temperature_of(f: Fitted, prior: Prior, index: Sequence[int]) -> float:
 
 
 class Scale:
-    """Evidence of sets of candidates for one gram; base: the posterior of no cause."""
+    """Evidence of sets of candidates for one gram; at: the posterior of no cause."""
 
     def __init__(self, data: NormalEquations, prior: Prior, candidates: CausePrior) -> None:
         self.prior, self.candidates = prior, candidates
-        self.base = base(data, prior)
+        self.at = posterior(data, prior)
 
     def __call__(self, members: Members) -> float:
         """Log evidence of a set."""
-        columns = self.candidates.columns
-        none = self.base.log_evidence - holding_back(self.base, self.prior, [c for i in members for c in columns[i]])
-        if not members:
-            return none
         ways = self.candidates.ways(members)
-        sets = [[[c for i in group for c in columns[i]] for group in groups] for _, groups in ways]
         odds = np.array([each for each, _ in ways])
-        return none + log_sum(odds + log_bayes(self.base, self.prior, sets)) - log_sum(odds)
+        return self.none(members) + log_sum(odds + [self.worth(groups) for _, groups in ways]) - log_sum(odds)
+
+    def none(self, members: Members) -> float:
+        """Log evidence of no cause, with all but members within reach."""
+        columns = [c for i in members for c in self.candidates.columns[i]]
+        return self.at.log_evidence - holding_back(self.at, self.prior, columns)
+
+    def worth(self, groups: Sequence[Members]) -> float:
+        """Log Bayes factor of members against none; those of a group are of one size."""
+        columns = [[c for i in group for c in self.candidates.columns[i]] for group in groups]
+        on = np.array([c for own in columns for c in own], int)
+        cause = np.repeat(np.arange(len(groups)), [len(own) for own in columns])
+        if not len(on):
+            return 0.0
+        equations = self.at.blocks_without([on])[0]
+        return float(log_bayes(equations, self.prior.sign[on], np.arange(len(on))[None], cause)[0])
 
 
 def scored(scale: Scale, sets: Iterable[Members]) -> list[tuple[float, Members]]:

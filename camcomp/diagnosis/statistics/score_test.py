@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import block_diag
 
-from camcomp.diagnosis.statistics.evidence import Prior, estimate_precision
+from camcomp.diagnosis.statistics.evidence import Prior, posterior
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.ground.datatypes import Floats, Ints
 
@@ -22,12 +22,8 @@ def projected(joint: NormalEquations, prior: Prior, members: Sequence[int]) -> t
     """Normal equations (p, p), (p,) of the patterns behind the columns of a prior (k,), with the columns `members` free and all others
     within tolerance.
     """
-    k = len(prior.tolerance)
-    M = joint.A[:k, :k] + np.diag(estimate_precision(prior, members))
-    size = 1.0 / np.sqrt(np.diag(M))
-    L = cholesky(size[:, None] * M * size + 1e-12 * np.eye(k), lower=True)
-    half = solve_triangular(L, size[:, None] * np.column_stack([joint.A[:k, k:], joint.b[:k]]), lower=True)
-    return joint.A[k:, k:] - half[:, :-1].T @ half[:, :-1], joint.b[k:] - half[:, :-1].T @ half[:, -1]
+    patterns = np.arange(len(prior.tolerance), len(joint.b))
+    return posterior(joint, prior, members).blocks_without([patterns])[0]
 
 
 def products_of_effect(
@@ -36,16 +32,10 @@ def products_of_effect(
     """Products (1 + p, 1 + p) of a cause with columns `own` at coordinates theta (d,), and of the patterns behind the columns of a
     prior (k,), with the columns `members` free and all others within tolerance.
     """
-    k = len(prior.tolerance)
-    of = np.zeros((len(joint.A), 1 + len(joint.A) - k))
-    of[own, 0], of[k:, 1:] = theta, np.eye(len(joint.A) - k)
-    moved = joint.A @ of
-    others = np.setdiff1d(np.arange(k), own)
-    M = joint.A[np.ix_(others, others)] + np.diag(estimate_precision(prior, members)[others])
-    size = 1.0 / np.sqrt(np.diag(M))
-    L = cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(others)), lower=True)
-    half = solve_triangular(L, size[:, None] * moved[others], lower=True)
-    return np.asarray(of.T @ moved - half.T @ half)
+    patterns = np.arange(len(prior.tolerance), len(joint.b))
+    gram, _ = posterior(joint, prior, members, own).blocks_without([np.append(own, patterns)])[0]
+    effect = block_diag(theta[:, None], np.eye(len(patterns)))
+    return np.asarray(effect.T @ gram @ effect)
 
 
 def score_test(P: Floats, h: Floats, labels: Sequence[str], kinds: Sequence[str]) -> dict[str, Shares]:

@@ -1,0 +1,115 @@
+"""Amplitudes of columns under normal priors, in closed form from normal equations.
+
+With D all columns that take part, P their prior precision, both whitened by R, and M = D'D + P
+
+    a | y ~ N(M^-1 D'y, M^-1),     log p(y) = -1/2 (y'y - y'D M^-1 D'y) - 1/2 log det(M P^-1) - log det R^1/2
+
+Further amplitudes x ~ N(0, S^2) of columns X have the gram G = X'(I - D M^-1 D')X and the moment m = X'(y - D M^-1 D'y)
+with all else integrated out, and are worth 1/2 m'S (I + S G S)^-1 S m - 1/2 log det(I + S G S).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from camcomp.diagnosis.statistics.normal_equations import NormalEquations
+from camcomp.ground.datatypes import Floats, Ints
+
+JITTER = 1e-13  # of the scaled precision: columns that repeat one another
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AmplitudePosterior:
+    """Columns `live` under their priors: mean (q,), 0 where a column takes no part, and log evidence of the data."""
+
+    data: NormalEquations
+    live: Ints
+    noise: float  # factor on the noise of the data
+    scale: Floats  # (live,) that make the precision's diagonal 1
+    factor: tuple[Floats, bool]  # of the scaled precision
+    mean: Floats
+    log_evidence: float
+
+    @staticmethod
+    def of(
+        data: NormalEquations, precision: Floats, live: Ints | None = None, noise: float = 1.0
+    ) -> AmplitudePosterior:
+        """From normal equations and prior precisions (q,), infinite where a column takes no part; noise: factor on the noise."""
+        live, square = np.flatnonzero(np.isfinite(precision)) if live is None else live, noise**2
+        A, own = data.A[np.ix_(live, live)] / square, precision[live]
+        scale = 1.0 / np.sqrt(np.diag(A) + own)
+        factor = cho_factor(scale[:, None] * (A + np.diag(own)) * scale + JITTER * np.eye(len(live)), lower=True)
+        b = scale * data.b[live] / square
+        solved = cho_solve(factor, b)
+        mean = np.zeros(len(precision))
+        mean[live] = scale * solved
+        value = -0.5 * (data.c / square - float(b @ solved)) - data.log_size - data.rows * log(noise)
+        value -= float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum() - 0.5 * np.log(own).sum())
+        return AmplitudePosterior(
+            data=data, live=live, noise=noise, scale=scale, factor=factor, mean=mean, log_evidence=value
+        )
+
+    def across(self, columns: Sequence[int] | Ints) -> Floats:
+        """Covariance (q, d) of all columns with some of the live ones."""
+        at = np.searchsorted(self.live, columns)
+        right, out = np.zeros((len(self.live), len(at))), np.zeros((len(self.mean), len(at)))
+        right[at, np.arange(len(at))] = self.scale[at]
+        out[self.live] = self.scale[:, None] * cho_solve(self.factor, right)
+        return out
+
+    def covariance(self, columns: Sequence[int]) -> Floats:
+        """Covariance (d, d) of some of the live columns."""
+        return np.asarray(self.across(columns)[columns], float)
+
+    def blocks_without(self, blocks: Sequence[Ints]) -> list[tuple[Floats, Floats]]:
+        """Normal equations of several groups of further columns, each alone, with all live ones integrated out."""
+        if not blocks:
+            return []
+        square = self.noise**2
+        columns = np.concatenate(list(blocks))
+        left = self.scale[:, None] * self.data.A[np.ix_(self.live, columns)] / square
+        solved = cho_solve(self.factor, left)
+        moment = self.data.b[columns] / square - left.T @ (self.mean[self.live] / self.scale)
+        out, start = [], 0
+        for own in blocks:
+            at = slice(start, start := start + len(own))
+            gram = self.data.A[np.ix_(own, own)] / square - left[:, at].T @ solved[:, at]
+            out.append((gram, moment[at]))
+        return out
+
+
+def weigh(
+    gram: Floats, moment: Floats, columns: tuple[Ints, Ints], sizes: tuple[Floats, Floats]
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Log evidence (w,) that amplitudes of all sets add, (s, w) that those of single sets add to it, and means and standard deviations
+    (s, w, o + e) of both together.
+
+    Args:
+        gram: (k, k) of all columns, with all else integrated out.
+        moment: (k,)
+        columns: (o,) of all s sets, which are eliminated once, and (s, e) of every set.
+        sizes: (w, o) and (s, w, e) standard deviations of the amplitudes before the data, w in turn.
+    """
+    (old, new), (a, b) = columns, sizes
+    A = a[:, :, None] * gram[np.ix_(old, old)] * a[:, None] + np.eye(len(old))  # (w, o, o)
+    B = a[:, :, None] * gram[old[:, None], new[:, None]][:, None] * b[:, :, None]  # (s, w, o, e)
+    C = b[..., None] * gram[new[:, :, None], new[:, None]][:, None] * b[:, :, None] + np.eye(new.shape[1])
+    P = np.linalg.inv(A)
+    alone = (P @ (a * moment[old])[:, :, None])[:, :, 0]
+    taken = P @ B
+    S = C - B.swapaxes(2, 3) @ taken
+    Q = np.linalg.inv(S)
+    left = b * moment[new][:, None] - (B * alone[:, :, None]).sum(axis=2)
+    gained = (Q @ left[..., None])[..., 0]
+    common = (alone * a * moment[old]).sum(axis=1) - np.linalg.slogdet(A)[1]
+    more = (left * gained).sum(axis=2) - np.linalg.slogdet(S)[1]
+    mean = np.concatenate([alone - (taken @ gained[..., None])[..., 0], gained], axis=2)
+    of_old = np.diagonal(P, axis1=1, axis2=2) + ((taken @ Q) * taken).sum(axis=3)
+    variance = np.concatenate([of_old, np.diagonal(Q, axis1=2, axis2=3)], axis=2)
+    size = np.concatenate([np.broadcast_to(a, of_old.shape), b], axis=2)
+    return 0.5 * common, 0.5 * more, size * mean, size * np.sqrt(np.maximum(variance, 0.0))
