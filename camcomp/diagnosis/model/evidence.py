@@ -149,8 +149,8 @@ class LinearModel:
         return np.asarray(np.minimum(1.0 / (size * np.sqrt(max(len(columns), 1))), most), float)
 
     def precision(self, background: Background, slab: Mapping[int, float] | None = None) -> Floats:
-        """Prior precision (q,) of all columns; slab: width of the columns of causes."""
-        out = np.full(self.layout.size, np.inf)  # of a column that takes no part
+        """Prior precision (q,) of all columns, infinite where one takes no part; slab: width of the columns of causes."""
+        out = np.full(self.layout.size, np.inf)
         for own in self.layout.nuisances.values():
             out[own] = FREE
         for name, scale in (*self.healthy.items(), *background.scales):
@@ -161,7 +161,8 @@ class LinearModel:
             width[on] = np.hypot(width[on], scale * unit)
         for j, more in (slab or {}).items():
             width[j] = np.hypot(width[j], more)
-        out[: self.layout.effects][width > 0.0] = 1.0 / width[width > 0.0] ** 2
+        acts = (width > 0.0) & (self.size > 0.0)
+        out[: self.layout.effects][acts] = 1.0 / width[acts] ** 2
         return out
 
     def total(self, process: SmoothProcess | None, groups: Sequence[int] | None = None) -> NormalEquations:
@@ -180,22 +181,18 @@ class LinearModel:
         absent: Sequence[int] = (),
     ) -> AmplitudePosterior:
         """Normal distribution of all columns except `absent`, from the given groups or from all fitted ones."""
-        data, precision = self.total(background.process, groups), self.precision(background, slab)
-        live = np.isfinite(precision)
-        live[: self.layout.effects] &= self.size > 0.0
-        live[list(absent)] = False
-        return AmplitudePosterior.of(data, precision, np.flatnonzero(live), background.noise)
+        precision = self.precision(background, slab)
+        precision[list(absent)] = np.inf
+        return AmplitudePosterior.of(self.total(background.process, groups).with_noise(background.noise), precision)
 
     def log_evidence(self, background: Background, slab: Mapping[int, float]) -> float:
         """Log evidence of causes with their slab, from the columns alone that take part."""
         if background.process is None or background.process in self._grams:
             return self.posterior(background, slab).log_evidence
         precision = self.precision(background, slab)
-        live = np.isfinite(precision)
-        live[: self.layout.effects] &= self.size > 0.0
-        on = np.flatnonzero(live)
+        on = np.flatnonzero(np.isfinite(precision))
         data = [normal_equations(self.groups[g], self.layout, background.process, on) for g in self.own]
-        return AmplitudePosterior.of(sum_grams(data), precision[on], np.arange(len(on)), background.noise).log_evidence
+        return AmplitudePosterior.of(sum_grams(data).with_noise(background.noise), precision[on]).log_evidence
 
     def reduced(self, background: Background) -> Reduced:
         """Normal equations of the effects with all else integrated out."""

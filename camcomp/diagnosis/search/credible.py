@@ -28,9 +28,10 @@ from camcomp.diagnosis.model.imitation import probability_with_unmodelled
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.search.unknown import joint_products, process_in_time
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Scale, parts_of
+from camcomp.diagnosis.statistics.evidence import posterior
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.diagnosis.statistics.probability import TEMPERATURE
-from camcomp.diagnosis.statistics.score_test import products_of_effect, projected
+from camcomp.diagnosis.statistics.score_test import products_of_effect
 from camcomp.ground.datatypes import Floats, Ints
 
 MODELLED = 0.1  # of what causes explain: none is modelled better than that
@@ -96,9 +97,11 @@ def _with_covariates(
     prior = log(UNKNOWN / (1.0 - UNKNOWN)) - log(max(len(groups), 1))
     out = []
     for some, own in zip(parts_of(f.members), alone, strict=True):
-        P, h = projected(joint, problem.prior, problem.member_columns(some))
-        for g, unit in groups:
-            gains, amount = gains_at_scales(P[np.ix_(g, g)], h[g], unit)
+        blocks = posterior(joint, problem.prior, problem.member_columns(some)).blocks_without(
+            [k + g for g, _ in groups]
+        )
+        for (g, unit), block in zip(groups, blocks, strict=True):
+            gains, amount = gains_at_scales(*block, unit)
             there = tuple(
                 has or float(_is_alike(joint.A, [*columns[i], *(k + g)], theta[i], amount))
                 for has, i in zip(own.there, f.members, strict=True)
@@ -131,9 +134,11 @@ def with_unmodelled(problem: Problem, f: Fitted, excess_um: float) -> dict[int, 
     weight = _weights(problem)
     joint = joint_products(problem, f, weight)
     functions = dict[str, tuple[float, Ints]]()
-    P, h = projected(joint, problem.prior, problem.member_columns(f.members))
-    for n, (g, unit) in enumerate(_covariates_with_units(problem, joint, weight)):
-        gains = gains_at_scales(P[np.ix_(g, g)], h[g], unit)[0]
+    groups, k = _covariates_with_units(problem, joint, weight), len(problem.columns.names)
+    at = posterior(joint, problem.prior, problem.member_columns(f.members))
+    blocks = at.blocks_without([k + g for g, _ in groups])
+    for n, ((g, unit), block) in enumerate(zip(groups, blocks, strict=True)):
+        gains = gains_at_scales(*block, unit)[0]
         functions[str(n)] = float(logsumexp(gains)) - log(len(gains)), np.concatenate([[0], 1 + g])
     out, columns = {}, problem.candidates.columns
     for i, theta in _thetas(problem, f).items():

@@ -13,9 +13,9 @@ from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SCALES
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
-from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
+from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram, posterior
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
-from camcomp.diagnosis.statistics.score_test import Shares, projected, score_test
+from camcomp.diagnosis.statistics.score_test import Shares, score_test
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
@@ -25,7 +25,8 @@ CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one ha
 def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, Shares]:
     """Score test on the residual of a set, per kind of channel; prior: of all other columns."""
     joint = joint_products(problem, f, [np.ones(len(r)) for r in f.residual])
-    P, h = projected(joint, prior, problem.member_columns(f.members))
+    patterns = np.arange(len(prior.tolerance), len(joint.b))
+    P, h = posterior(joint, prior, problem.member_columns(f.members)).blocks_without([patterns])[0]
     return score_test(P, h, problem.dictionary.labels, problem.dictionary.kinds)
 
 

@@ -11,9 +11,10 @@ from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.normal_equations import NormalEquations
+from camcomp.diagnosis.statistics.posterior import AmplitudePosterior
 from camcomp.ground.datatypes import Floats, Ints
 
 PARTS = 4  # of a whole that are looked at one by one: of a log, of a run, of a disturbance
@@ -88,25 +89,19 @@ class Folds:
         self.precision = np.concatenate([self.precision, precision])
 
     def _factorise(self) -> None:
-        every = [A + np.diag(self.precision) for A in _without_each([A for A, _ in self._grams])]
-        self._halves = [np.asarray(np.linalg.cholesky(M + 1e-12 * np.diag(np.diag(M)))) for M in every]
-        self._targets = [
-            np.asarray(solve_triangular(L, b, lower=True))
-            for L, b in zip(self._halves, _without_each([b for _, b in self._grams]), strict=True)
-        ]
+        sums = (_without_each(parts) for parts in zip(*self._grams, strict=True))
+        data = [NormalEquations(A, b, 0.0, 0) for A, b in zip(*sums, strict=True)]
+        self._each = [AmplitudePosterior.of(own, self.precision) for own in data]
 
     def left(self) -> list[Floats]:
         """White residual (w,) per run that the base leaves, fitted to all data."""
-        a = solve_triangular(self._halves[0].T, self._targets[0], lower=False)
-        return [r - W @ a for r, W in zip(self.residual, self.white, strict=True)]
+        return [r - W @ self._each[0].mean for r, W in zip(self.residual, self.white, strict=True)]
 
     def means(self, more: Sequence[RunColumns], precision: Floats) -> Floats:
         """Coordinates (f, k) of the base, fitted jointly with law columns of that prior precision: with all data, and
         without each part.
         """
-        both = self.extended(more, precision)
-        found = [solve_triangular(L.T, t, lower=False) for L, t in zip(both._halves, both._targets, strict=True)]
-        return np.array(found)[:, : len(self.precision)]
+        return np.array([each.mean for each in self.extended(more, precision)._each])[:, : len(self.precision)]
 
     def coefficients(self, columns: Sequence[RunColumns], precision: Floats) -> tuple[Floats, Floats]:
         """Those (f, c) of law columns of that prior precision, of all data and without each part, and their covariance (c, c)."""
@@ -120,10 +115,10 @@ class Folds:
         count).
         """
         base = [np.sum([W.T @ X for W, X in zip(own, x, strict=True)], axis=0) for own in (self.white, *self.more)]
-        half = solve_triangular(self._halves[0], np.concatenate(base), lower=True)
+        half = self._each[0].half(np.concatenate(base))
         target = np.sum([X.T @ r for X, r in zip(x, self.residual, strict=True)], axis=0)
         own = _grams([values for each in x for on, values in each.parts if len(on)], count)
-        return own - _grams([half], count), (target - half.T @ self._targets[0]).reshape(-1, count)
+        return own - _grams([half], count), (target - half.T @ self._each[0].target).reshape(-1, count)
 
     def together(self, xs: Sequence[RunColumns]) -> tuple[Floats, Floats]:
         """Columns (c) of several spots, one behind the other, with the base taken out, for all data and for all but one part
@@ -131,10 +126,10 @@ class Folds:
         """
         every = [_without_each(parts) for parts in zip(*self._products(xs), strict=True)]
         G, h = [], []
-        for L, t, cross, gram, target in zip(self._halves, self._targets, *every, strict=True):
-            half = solve_triangular(L, cross, lower=True)
+        for own, cross, gram, target in zip(self._each, *every, strict=True):
+            half = own.half(cross)
             G.append(gram - half.T @ half)
-            h.append(target - half.T @ t)
+            h.append(target - half.T @ own.target)
         return np.array(G), np.array(h)
 
     def _products(self, xs: Sequence[RunColumns]) -> list[tuple[Floats, Floats, Floats]]:

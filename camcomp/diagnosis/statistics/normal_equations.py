@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from camcomp.ground.datatypes import Floats
 
 
@@ -17,6 +19,13 @@ class NormalEquations:
     c: float
     rows: int
     log_size: float = 0.0
+
+    def with_noise(self, factor: float) -> NormalEquations:
+        """With so many times the noise."""
+        if factor == 1.0:
+            return self
+        more, square = self.rows * float(np.log(factor)), factor**2
+        return NormalEquations(self.A / square, self.b / square, self.c / square, self.rows, self.log_size + more)
 
 
 def sum_grams(grams: Sequence[NormalEquations]) -> NormalEquations:

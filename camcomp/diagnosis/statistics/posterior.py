@@ -12,10 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import log
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.ground.datatypes import Floats, Ints
@@ -29,29 +28,26 @@ class AmplitudePosterior:
 
     data: NormalEquations
     live: Ints
-    noise: float  # factor on the noise of the data
     scale: Floats  # (live,) that make the precision's diagonal 1
-    factor: tuple[Floats, bool]  # of the scaled precision
+    factor: Floats  # (live, live) lower triangle of the scaled precision
+    target: Floats  # `half` (live,) of the data themselves
     mean: Floats
     log_evidence: float
 
     @staticmethod
-    def of(
-        data: NormalEquations, precision: Floats, live: Ints | None = None, noise: float = 1.0
-    ) -> AmplitudePosterior:
-        """From normal equations and prior precisions (q,), infinite where a column takes no part; noise: factor on the noise."""
-        live, square = np.flatnonzero(np.isfinite(precision)) if live is None else live, noise**2
-        A, own = data.A[np.ix_(live, live)] / square, precision[live]
+    def of(data: NormalEquations, precision: Floats) -> AmplitudePosterior:
+        """From normal equations and prior precisions (q,), infinite where a column takes no part."""
+        live = np.flatnonzero(np.isfinite(precision))
+        A, own = data.A[np.ix_(live, live)], precision[live]
         scale = 1.0 / np.sqrt(np.diag(A) + own)
-        factor = cho_factor(scale[:, None] * (A + np.diag(own)) * scale + JITTER * np.eye(len(live)), lower=True)
-        b = scale * data.b[live] / square
-        solved = cho_solve(factor, b)
+        factor = cholesky(scale[:, None] * (A + np.diag(own)) * scale + JITTER * np.eye(len(live)), lower=True)
+        target = solve_triangular(factor, scale * data.b[live], lower=True)
         mean = np.zeros(len(precision))
-        mean[live] = scale * solved
-        value = -0.5 * (data.c / square - float(b @ solved)) - data.log_size - data.rows * log(noise)
-        value -= float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum() - 0.5 * np.log(own).sum())
+        mean[live] = scale * solve_triangular(factor, target, lower=True, trans=1)
+        log_det = 2.0 * float((np.log(np.diag(factor)) - np.log(scale)).sum()) - float(np.log(own).sum())
+        value = -0.5 * (data.c - float(target @ target) + log_det) - data.log_size
         return AmplitudePosterior(
-            data=data, live=live, noise=noise, scale=scale, factor=factor, mean=mean, log_evidence=value
+            data=data, live=live, scale=scale, factor=factor, target=target, mean=mean, log_evidence=value
         )
 
     def across(self, columns: Sequence[int] | Ints) -> Floats:
@@ -59,27 +55,28 @@ class AmplitudePosterior:
         at = np.searchsorted(self.live, columns)
         right, out = np.zeros((len(self.live), len(at))), np.zeros((len(self.mean), len(at)))
         right[at, np.arange(len(at))] = self.scale[at]
-        out[self.live] = self.scale[:, None] * cho_solve(self.factor, right)
+        out[self.live] = self.scale[:, None] * cho_solve((self.factor, True), right)
         return out
 
     def covariance(self, columns: Sequence[int]) -> Floats:
         """Covariance (d, d) of some of the live columns."""
         return np.asarray(self.across(columns)[columns], float)
 
+    def half(self, products: Floats) -> Floats:
+        """L^-1 x (live, d) of products x of the live columns with others, L L' the precision: H'H is what they take of these."""
+        return np.asarray(solve_triangular(self.factor, self.scale[:, None] * products, lower=True))
+
     def blocks_without(self, blocks: Sequence[Ints]) -> list[tuple[Floats, Floats]]:
         """Normal equations of several groups of further columns, each alone, with all live ones integrated out."""
         if not blocks:
             return []
-        square = self.noise**2
         columns = np.concatenate(list(blocks))
-        left = self.scale[:, None] * self.data.A[np.ix_(self.live, columns)] / square
-        solved = cho_solve(self.factor, left)
-        moment = self.data.b[columns] / square - left.T @ (self.mean[self.live] / self.scale)
+        taken = self.half(self.data.A[np.ix_(self.live, columns)])
+        moment = self.data.b[columns] - taken.T @ self.target
         out, start = [], 0
         for own in blocks:
             at = slice(start, start := start + len(own))
-            gram = self.data.A[np.ix_(own, own)] / square - left[:, at].T @ solved[:, at]
-            out.append((gram, moment[at]))
+            out.append((self.data.A[np.ix_(own, own)] - taken[:, at].T @ taken[:, at], moment[at]))
         return out
 
 

@@ -18,14 +18,6 @@ from camcomp.ground.datatypes import Floats, Ints
 Shares = tuple[tuple[str, float], ...]  # covariates with the share that each carries alone, largest first
 
 
-def projected(joint: NormalEquations, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
-    """Normal equations (p, p), (p,) of the patterns behind the columns of a prior (k,), with the columns `members` free and all others
-    within tolerance.
-    """
-    patterns = np.arange(len(prior.tolerance), len(joint.b))
-    return posterior(joint, prior, members).blocks_without([patterns])[0]
-
-
 def products_of_effect(
     joint: NormalEquations, prior: Prior, members: Sequence[int], own: Sequence[int], theta: Floats
 ) -> Floats:
@@ -41,7 +33,7 @@ def products_of_effect(
 def score_test(P: Floats, h: Floats, labels: Sequence[str], kinds: Sequence[str]) -> dict[str, Shares]:
     """Shares of the energy beyond chance of the patterns of every kind of channel, the kind with most of it first.
 
-    P (p, p), h (p,): projected; labels, kinds (p,): covariate of every pattern, and kind of the channel that it moves.
+    P (p, p), h (p,): normal equations with all else integrated out; labels, kinds (p,): covariate of every pattern, and kind of the channel that it moves.
     """
     found = []
     for kind in dict.fromkeys(kinds):
