@@ -9,7 +9,7 @@ Source: George, McCulloch, Statistica Sinica 7 (1997) 339; half-normal slabs whe
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import comb, log
@@ -203,50 +203,54 @@ class LinearModel:
             own, by = at.blocks_without([effects])[0]
             gram, moment = np.zeros((k, k)), np.zeros(k)
             gram[np.ix_(effects, effects)], moment[effects] = own, by
-            self._reduced[background] = Reduced(self, gram, moment, at.log_evidence)
+            self._reduced[background] = Reduced(
+                candidates=self.candidates, units=self._units, bounds=self.bounds, prior=self._log_prior, gram=gram,
+                moment=moment, none=at.log_evidence,
+            )  # fmt: skip
         return self._reduced[background]
 
+    @cached_property
+    def _units(self) -> list[Floats]:
+        """Amplitudes (d,) of every candidate at which it acts by one floor, its columns in equal parts."""
+        return [self.unit(np.array(c.columns, int)) for c in self.candidates]
 
-@dataclass(frozen=True, eq=False)
+    def _log_prior(self, members: Members) -> float:
+        """Log prior of a set: its number of causes, places equally likely, shapes of a place equally likely."""
+        places = len({c.place for c in self.candidates})
+        return log(SIZES[len(members)] / comb(places, len(members))) - sum(
+            log(self.candidates[i].ways) for i in members
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Reduced:
-    """Normal equations of the effects (gram (k, k), moment (k,)), and the log evidence of no cause at all."""
+    """Sets of candidates weighed by the normal equations of the effects with all else integrated out.
 
-    model: LinearModel
+    units: amplitudes (d,) of every candidate in which `widths` are counted, 0 where one is not seen. prior: log prior of a
+    set. gram (k, k), moment (k,); none: log evidence of no cause at all.
+    """
+
+    candidates: Sequence[PlacedCause]
+    units: Sequence[Floats]
+    bounds: AmplitudeBounds
+    prior: Callable[[Members], float]
     gram: Floats
     moment: Floats
     none: float
-
-    @cached_property
-    def _unit(self) -> list[Floats]:
-        """Amplitudes (d,) of every candidate at which it acts by one floor, its columns in equal parts."""
-        return [self.model.unit(np.array(c.columns, int)) for c in self.model.candidates]
-
-    @cached_property
-    def _places(self) -> int:
-        return len({c.place for c in self.model.candidates})
-
-    @property
-    def candidates(self) -> Sequence[PlacedCause]:
-        """All candidates."""
-        return self.model.candidates
+    widths: tuple[float, ...] = WIDTHS
 
     @property
     def usable(self) -> list[int]:
         """Candidates all of whose columns are seen."""
-        return [i for i, unit in enumerate(self._unit) if unit.all()]
+        return [i for i, unit in enumerate(self.units) if unit.all()]
 
-    def units(self, members: Members) -> Floats:
-        """Amplitudes (d,) at which every member acts by one floor."""
-        return np.concatenate([np.zeros(0), *(self._unit[i] for i in members)])
+    def units_of(self, members: Members) -> Floats:
+        """Units (d,) of the columns of members."""
+        return np.concatenate([np.zeros(0), *(self.units[i] for i in members)])
 
     def indices(self, members: Members) -> list[int]:
         """Columns of members, one after the other."""
-        return [j for i in members for j in self.model.candidates[i].columns]
-
-    def prior(self, members: Members) -> float:
-        """Log prior of a set: its number of causes, places equally likely, shapes of a place equally likely."""
-        ways = sum(log(self.model.candidates[i].ways) for i in members)
-        return log(SIZES[len(members)]) - log(comb(self._places, len(members))) - ways
+        return [j for i in members for j in self.candidates[i].columns]
 
     def value(self, members: Members) -> float:
         """Log posterior of a set up to a constant, evidence and prior."""
@@ -257,7 +261,7 @@ class Reduced:
     def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
         """Log posterior (s,) of a set with one candidate more each, up to a constant."""
         out = np.array([self.none + self.prior((*members, i)) for i in more])
-        count = np.array([len(self.model.candidates[i].columns) for i in more])
+        count = np.array([len(self.candidates[i].columns) for i in more])
         for d in np.unique(count):
             own = np.flatnonzero(count == d)
             value = self._posterior(members, [more[i] for i in own.tolist()])[0]
@@ -271,29 +275,29 @@ class Reduced:
         """Amplitudes (d,), covariance (d, d) and the most probable width, small errors integrated out."""
         value, mean = self._posterior(members[:-1], members[-1:])
         w = int(np.argmax(value[0]))
-        on, unit = self.indices(members), self.units(members)
-        M = unit[:, None] * self.gram[np.ix_(on, on)] * unit + np.eye(len(on)) / WIDTHS[w] ** 2
-        return mean[0, w], unit[:, None] * np.linalg.inv(M) * unit, WIDTHS[w]
+        on, unit = self.indices(members), self.units_of(members)
+        M = unit[:, None] * self.gram[np.ix_(on, on)] * unit + np.eye(len(on)) / self.widths[w] ** 2
+        return mean[0, w], unit[:, None] * np.linalg.inv(M) * unit, self.widths[w]
 
     def slab(self, members: Members) -> dict[int, float]:
         """Width of the columns of members, where their slab is the most probable one."""
         if not members:
             return {}
         width = self.estimate(members)[2]
-        return dict(zip(self.indices(members), (width * self.units(members)).tolist(), strict=True))
+        return dict(zip(self.indices(members), (width * self.units_of(members)).tolist(), strict=True))
 
     def _posterior(self, members: Members, more: Sequence[int]) -> tuple[Floats, Floats]:
         """Log evidence (s, widths) and amplitudes (s, widths, d) of a set with one of s candidates more, each of e columns."""
-        old, new = np.array(self.indices(members), int), np.array([self.model.candidates[i].columns for i in more])
-        units = self.units(members), np.array([self._unit[i] for i in more])[:, None]
-        sizes = np.outer(WIDTHS, units[0]), np.array(WIDTHS)[:, None] * units[1]
+        old, new = np.array(self.indices(members), int), np.array([self.candidates[i].columns for i in more])
+        units = self.units_of(members), np.array([self.units[i] for i in more])[:, None]
+        sizes = np.outer(self.widths, units[0]), np.array(self.widths)[:, None] * units[1]
         common, own, mean, sd = weigh(self.gram, self.moment, (old, new), sizes)
         on = np.concatenate([np.broadcast_to(old, (len(new), len(old))), new], axis=1)[:, None, :]
         return common + own + self._inside(mean, sd, on), mean
 
     def _inside(self, mean: Floats, sd: Floats, on: np.ndarray) -> Floats:
         """Log share (s, widths) of the posterior that has the right signs; minus infinity far outside of the bounds."""
-        bounds = self.model.bounds
+        bounds = self.bounds
         signed = bounds.sign[on] > 0.0
         share = log_ndtr(np.where(signed, mean / np.maximum(sd, 1e-300), 0.0)) + log(2.0)
         out = np.where(signed, share, 0.0).sum(axis=2)

@@ -7,13 +7,13 @@ the search is repeated about the best fit until it is the same again.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.candidates import PlacedCause
+from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
+from camcomp.diagnosis.model.evidence import Reduced
 from camcomp.diagnosis.model.search import SLACK, search_sets
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
@@ -21,45 +21,26 @@ from camcomp.diagnosis.statistics.cause_sets import (
     Scale,
     scored,
 )
-from camcomp.diagnosis.statistics.evidence import estimate, log_bayes
-from camcomp.diagnosis.statistics.normal_equations import sum_grams
+from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS, estimate
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground import progress
-from camcomp.ground.datatypes import Floats
 
 TRIED = 5  # sets fitted about a fit that are larger than it, as many of those that are not, and of single causes
 
 
-@dataclass(frozen=True, eq=False)
-class LinearSets:
-    """Sets weighed by the evidence linearised about one fit, tolerances as stated; for model/search."""
-
-    scale: Scale
-    usable: Sequence[int]
-    candidates: Sequence[PlacedCause]
-
-    @cached_property
-    def _equations(self) -> tuple[Floats, Floats]:
-        """Normal equations of all columns' amplitudes, with all small errors integrated out."""
-        return self.scale.at.blocks_without([np.arange(len(self.scale.at.mean))])[0]
-
-    def value(self, members: Members) -> float:
-        """Log evidence plus log prior."""
-        scale = self.scale
-        return scale.at.log_evidence + scale.worth([(i,) for i in members]) + scale.candidates.prior(members)
-
-    def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
-        """The same (m,) of a set with one of `more` each, the set's own amplitudes free; -inf where two exclude each other."""
-        known = self.scale.candidates
-        own, columns = [c for i in members for c in known.columns[i]], [known.columns[i] for i in more]
-        gains, count = np.zeros(len(more)), np.array([len(each) for each in columns])
-        for d in np.unique(count):
-            at = np.flatnonzero(count == d)
-            index = np.array([columns[i] for i in at.tolist()])
-            gains[at] = log_bayes(self._equations, self.scale.prior.sign, index, np.zeros(d, int), own)
-        gains += [known.prior(tuple(sorted((*members, i)))) for i in more]
-        gains[[any(known.exclusive(i, j) for j in members) for i in more]] = -np.inf
-        return np.asarray(gains + self.value(members) - known.prior(members), float)
+def linear_sets(scale: Scale, places: Sequence[tuple[str, str | None]]) -> Reduced:
+    """Sets weighed by the evidence linearised about one fit, tolerances as stated, the causes of a set of one width in their
+    typical sizes; places: effect and target of every candidate.
+    """
+    columns, data = scale.candidates.columns, scale.at.data
+    gram, moment = scale.at.blocks_without([np.arange(len(data.b))])[0]
+    most = np.full(len(data.b), np.inf)
+    return Reduced(
+        candidates=[PlacedCause(*place, own) for place, own in zip(places, columns, strict=True)],
+        units=[np.full(len(own), float(data.A[own, own].any())) for own in columns],
+        bounds=AmplitudeBounds(-most, most, scale.prior.sign, most < 0.0), prior=scale.candidates.prior, gram=gram,
+        moment=moment, none=scale.at.log_evidence, widths=PRIOR_WIDTHS,
+    )  # fmt: skip
 
 
 class FittedSets:
@@ -67,8 +48,6 @@ class FittedSets:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        seen = np.diag(sum_grams(problem.base_grams).A)
-        self.every = [i for i, own in enumerate(problem.candidates.columns) if seen[list(own)].any()]
         self.null = problem.refit(())
         self.done: dict[Members, Fitted] = {(): self.null}
         self.searched = set[Members]()
@@ -89,9 +68,8 @@ class FittedSets:
         self.searched.add(near.members)
         problem = self.problem
         scale = Scale(near.data, problem.prior, problem.candidates)
-        named = zip(problem.columns.candidates, problem.candidates.columns, strict=True)
-        places = [PlacedCause(c.name, c.target, own) for c, own in named]
-        found = search_sets(LinearSets(scale, self.every, places))
+        sets = linear_sets(scale, [(c.name, c.target) for c in problem.columns.candidates])
+        found = search_sets(sets)
         larger = {members for members in found if len(members) > len(near.members)}
         for some in (larger, found.keys() - larger - self.done.keys()):
             first = sorted(some, key=lambda members: (-found[members], members))[: 3 * TRIED]
@@ -101,7 +79,7 @@ class FittedSets:
                 if value > best - SLACK:
                     self.fit(members, near)
         if not near.members:
-            for _, members in scored(scale, [(i,) for i in self.every])[:TRIED]:
+            for _, members in scored(scale, [(i,) for i in sets.usable])[:TRIED]:
                 self.fit(members)
 
     def answers(self, temperature: float = 1.0) -> list[Fitted]:

@@ -72,8 +72,11 @@ class CausePrior:
 
     def prior(self, members: Members, minor: Members = ()) -> float:
         """Log prior probability of a set with its minor effects; cached."""
+        members = tuple(sorted(members))
         if (members, minor) not in self._priors:
-            self._priors[members, minor] = log_sum([odds for odds, _ in self.ways(members, minor)])
+            apart = any(self.exclusive(*both) for both in combinations(members, 2))
+            odds = [each for each, _ in self.ways(members, minor)]
+            self._priors[members, minor] = -np.inf if apart else log_sum(odds)
         return self._priors[members, minor]
 
     def value(self, f: Fitted, temperature: float = 1.0) -> float:
@@ -150,7 +153,7 @@ class Scale:
         if not len(on):
             return 0.0
         equations = self.at.blocks_without([on])[0]
-        return float(log_bayes(equations, self.prior.sign[on], np.arange(len(on))[None], cause)[0])
+        return log_bayes(equations, self.prior.sign[on], cause)
 
 
 def scored(scale: Scale, sets: Iterable[Members]) -> list[tuple[float, Members]]:

@@ -21,14 +21,14 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import log_ndtr
 
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.diagnosis.statistics.posterior import AmplitudePosterior, weigh
 from camcomp.ground.datatypes import Floats, Ints
 
-PRIOR_WIDTHS = np.array([0.02, 0.1, 0.5, 2.5])
+PRIOR_WIDTHS = (0.02, 0.1, 0.5, 2.5)
 FREE = 0.01  # precision of a cause while it is fitted: within 10 scales
 PASSES = 30  # of the search for columns at the end of their reach
 
@@ -73,24 +73,15 @@ def posterior(
     return AmplitudePosterior.of(data, precision)
 
 
-def log_bayes(
-    equations: tuple[Floats, Floats], sign: Floats, index: Ints, cause: Ints, beside: Sequence[int] = ()
-) -> Floats:
-    """Log Bayes factor (s,) of sets with columns index (s, d), which belong to the causes (d,), against none of these.
+def log_bayes(equations: tuple[Floats, Floats], sign: Floats, cause: Ints) -> float:
+    """Log Bayes factor of a set whose columns belong to the causes (d,) against none.
 
-    Args:
-        equations: (k, k) and (k,) normal equations of amplitudes, with all else integrated out.
-        sign: (k,) of the amplitudes.
-        index: columns of every set.
-        cause: number of the cause that each of them belongs to.
-        beside: columns that are free within 10 scales either way.
+    equations: normal equations (d, d), (d,) of their amplitudes, with all else integrated out. sign (d,): of these.
     """
-    sizes, free = _widths(int(cause[-1]) + 1)[:, cause], np.array(beside, int)
-    both = np.full((len(sizes), len(free)), FREE**-0.5), np.broadcast_to(sizes, (len(index), *sizes.shape))
-    _, value, mean, sd = weigh(*equations, (free, index), both)
-    right = log_ndtr(mean[..., len(free) :] / sd[..., len(free) :]) + np.log(2.0)
-    value += np.where(sign[index][:, None] > 0, right, 0.0).sum(axis=2)
-    return np.asarray(logsumexp(value, axis=1) - np.log(len(sizes)), float)
+    sizes, on = _widths(int(cause[-1]) + 1)[:, cause], np.arange(len(cause))
+    _, value, mean, sd = weigh(*equations, (on[:0], on[None]), (sizes[:, :0], sizes[None]))
+    value += np.where(sign > 0, log_ndtr(mean / sd) + np.log(2.0), 0.0).sum(axis=2)
+    return float(log_sum(value[0]) - np.log(len(sizes)))
 
 
 @cache

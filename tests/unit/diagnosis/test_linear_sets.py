@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.search import best_of, search_sets
-from camcomp.diagnosis.search.fitted_sets import LinearSets
+from camcomp.diagnosis.search.fitted_sets import linear_sets
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale, scored
 from camcomp.diagnosis.statistics.evidence import Prior, gram
 
@@ -14,12 +13,15 @@ COLUMNS = (*((i,) for i in range(7)), (7, 8))
 TRUTH = (0, 1, FORCE)
 
 
-def sets(D, r, excluded=2):
-    """Sets of the columns D (n, 9) that explain r (n,); a candidate excludes that of two columns."""
+def scale(D, r, excluded=2):
+    """Evidence of sets of the columns D (n, 9) that explain r (n,); a candidate excludes that of two columns."""
     prior = Prior(np.full(9, 1e-3), np.zeros(9), np.full(9, np.inf))
     known = CausePrior(COLUMNS, np.full(8, -np.log(8.0)), lambda i, j: {i, j} == {excluded, TWO}, (SPRINGS,))
-    places = [PlacedCause(str(i), None, own) for i, own in enumerate(COLUMNS)]
-    return LinearSets(Scale(gram(D, r), prior, known), range(8), places)
+    return Scale(gram(D, r), prior, known)
+
+
+def sets(D, r, excluded=2):
+    return linear_sets(scale(D, r, excluded), [(str(i), None) for i in range(8)])
 
 
 def drawn(seed):
@@ -31,9 +33,8 @@ def test_springs_and_force_are_found_though_two_that_undo_one_another_do_nearly_
     D, noise = drawn(2)
     wrong = D[:, list(TRUTH)].sum(axis=1)
     D[:, WEIGHT] = wrong + D[:, LENGTH] + 0.15 * D[:, WEIGHT]
-    data = sets(D, wrong + noise)
-    assert best_of(search_sets(data)) == TRUTH
-    assert scored(data.scale, [(WEIGHT, LENGTH), TRUTH])[0][1] == TRUTH
+    assert best_of(search_sets(sets(D, wrong + noise))) == TRUTH
+    assert scored(scale(D, wrong + noise), [(WEIGHT, LENGTH), TRUTH])[0][1] == TRUTH
 
 
 def test_a_cause_of_two_columns_is_found_and_never_jointly_with_one_that_it_excludes():
@@ -45,8 +46,10 @@ def test_a_cause_of_two_columns_is_found_and_never_jointly_with_one_that_it_excl
     assert not [members for members in found if {0, TWO} <= set(members)]
 
 
-def test_one_more_member_is_worth_what_the_larger_set_is():
+def test_sets_are_worth_nearly_what_they_are_where_every_cause_has_a_width_of_its_own():
     D, noise = drawn(4)
-    data = sets(D, 0.3 * D[:, 0] + 0.2 * D[:, FORCE] + noise)
-    more = data.with_one_more((0,), [1, FORCE])
-    assert more == pytest.approx([data.value((0, 1)), data.value((0, FORCE))], abs=1.0)
+    r = 0.3 * D[:, 0] + 0.2 * D[:, FORCE] + noise
+    data, own = sets(D, r), scale(D, r)
+    for members in ((0,), (0, 1), (0, FORCE), (0, FORCE, TWO)):
+        exact = own.at.log_evidence + own.worth([(i,) for i in members]) + own.candidates.prior(members)
+        assert data.value(members) == pytest.approx(exact, abs=1.5)

@@ -60,7 +60,7 @@ def test_evidence_is_the_density_of_a_normal_distribution(background, members):
         variance = np.array(1.0 / m.precision(background))
         variance[m.layout.effects :][variance[m.layout.effects :] < 1e-20] = 0.0
         for i in members:
-            variance[i] += (width * data.units((i,))[0]) ** 2
+            variance[i] += (width * data.units[i][0]) ** 2
         C = D @ np.diag(variance) @ D.T + (background.noise * SD) ** 2 * np.eye(len(D))
         value.append(multivariate_normal(np.zeros(len(D)), C).logpdf(whole) + 0.5 * len(D) * np.log(2.0 * np.pi))
     expected = np.log(np.mean(np.exp(np.array(value) - max(value)))) + max(value)

@@ -6,10 +6,9 @@ from math import comb
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.model.candidates import PlacedCause
 from camcomp.diagnosis.model.search import best_of, search_sets
 from camcomp.diagnosis.search.cause_search import rank
-from camcomp.diagnosis.search.fitted_sets import LinearSets
+from camcomp.diagnosis.search.fitted_sets import linear_sets
 from camcomp.diagnosis.statistics.cause_sets import (
     SIZES,
     CausePrior,
@@ -31,9 +30,7 @@ def fitted(*members):
 
 def found_in(scale):
     """The best set of candidates of one column each."""
-    columns = scale.candidates.columns
-    places = [PlacedCause(str(i), None, own) for i, own in enumerate(columns)]
-    return best_of(search_sets(LinearSets(scale, range(len(columns)), places)))
+    return best_of(search_sets(linear_sets(scale, [(str(i), None) for i in range(len(scale.candidates.columns))])))
 
 
 @pytest.mark.parametrize("size", [0, 1, 2, 3])

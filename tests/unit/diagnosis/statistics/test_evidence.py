@@ -15,7 +15,6 @@ from camcomp.diagnosis.statistics.evidence import (
     estimate,
     gram,
     holding_back,
-    log_bayes,
     posterior,
 )
 
@@ -33,11 +32,10 @@ def data(truth, n=300, k=4, seed=1):
     return gram(D, D @ np.array(truth) + rng.standard_normal(n))
 
 
-def worth(g, p, *causes, beside=()):
+def worth(g, p, *causes):
     """Log Bayes factor of causes with these columns."""
-    every = posterior(g, p).blocks_without([np.arange(len(g.b))])[0]
-    index = np.array([[c for own in causes for c in own]])
-    return log_bayes(every, p.sign, index, np.repeat(range(len(causes)), [len(own) for own in causes]), beside)[0]
+    candidates = CausePrior(causes, np.zeros(len(causes)), lambda i, j: False)
+    return Scale(g, p, candidates).worth([(i,) for i in range(len(causes))])
 
 
 def test_bayes_factor_of_one_cause_is_the_integral_it_stands_for():
@@ -68,13 +66,10 @@ def test_a_cause_of_the_wrong_sign_is_held_against_it():
     assert worth(g, signed, [0]) < worth(g, free, [0]) - 10
 
 
-def test_sets_at_once_equal_sets_one_by_one():
+def test_a_set_is_worth_what_its_columns_are_in_any_order():
     g, p = data([0.3, 0.0, -0.2, 0.05]), prior(4, [0.0, 1.0, 1.0, 1.0])
-    every = posterior(g, p).blocks_without([np.arange(4)])[0]
-    for beside in ((), (3,)):
-        for sets, cause in ([[[2], [0], [1]], [0]], [[[0, 1], [0, 2]], [0, 1]], [[[0, 1, 2], [2, 1, 0]], [0, 1, 1]]):
-            one_by_one = [log_bayes(every, p.sign, np.array([own]), np.array(cause), beside)[0] for own in sets]
-            assert log_bayes(every, p.sign, np.array(sets), np.array(cause), beside) == pytest.approx(one_by_one)
+    assert worth(g, p, [0, 2], [1]) == pytest.approx(worth(g, p, [1], [2, 0]))
+    assert worth(g, p) == 0.0
 
 
 def test_what_is_within_tolerance_is_no_finding():
@@ -130,16 +125,6 @@ def test_what_needs_no_tolerance_beyond_its_reach_wins():
         return scale((0, 1)) + candidates.prior((0, 1)) - scale((0,)) - candidates.prior((0,))
 
     assert lead(prior(2, tolerance=0.1)) < 0.0 < lead(prior(2, tolerance=0.1, reach=0.2))
-
-
-def test_a_cause_beside_free_columns_is_worth_what_it_is_with_these_within_ten_scales():
-    rng = np.random.default_rng(8)
-    D = rng.standard_normal((60, 4))
-    g = gram(D, D @ np.array([0.5, -0.2, 0.1, 0.4]) + rng.standard_normal(60))
-    stated = Prior(np.array([0.1, 0.2, 0.3, 0.1]), np.zeros(4), np.full(4, np.inf))
-    wide = replace(stated, tolerance=np.hypot(stated.tolerance, [0.0, 10.0, 0.0, 10.0]))
-    assert worth(g, stated, [0], beside=[1, 3]) == pytest.approx(worth(g, wide, [0]), abs=1e-9)
-    assert worth(g, stated, [0], beside=[1, 3]) != pytest.approx(worth(g, stated, [0]), abs=1e-3)
 
 
 def test_an_absent_column_takes_no_part():
