@@ -12,6 +12,7 @@ import numpy as np
 
 from camcomp.diagnosis.answer.held_out import causes_without, shrinkage_of
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
+from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import floor_um, gap_sizes, main_channels
 from camcomp.diagnosis.fit.intervals import joint_covariance
@@ -47,7 +48,6 @@ from camcomp.diagnosis.search.unexplained import worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
-from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import effective_rows
 from camcomp.diagnosis.statistics.periods import frequencies

@@ -8,14 +8,15 @@ import numpy as np
 
 from camcomp.diagnosis.answer.unseen import JudgedRun, unseen_shrinkage
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run
+from camcomp.diagnosis.fit.cause_sets import Fitted, Scale, parts_of, temperature_of
 from camcomp.diagnosis.fit.columns import candidate_columns
 from camcomp.diagnosis.fit.gap import floor_um, main_channels, square_lengths
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import MOST_SETS
+from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.folds import without_nuisances
 from camcomp.diagnosis.result.types import UnseenShrinkage
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, parts_of, temperature_of
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause

@@ -3,8 +3,8 @@
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import thinned
+from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.ground.datatypes import Floats
 

@@ -9,8 +9,8 @@ Source of the second part: sandwich covariance over blocks (Liang, Zeger 1986; N
 
 import numpy as np
 
+from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import FREE, gram, within
 from camcomp.diagnosis.statistics.normal_equations import sum_grams
 from camcomp.diagnosis.statistics.posterior import AmplitudePosterior

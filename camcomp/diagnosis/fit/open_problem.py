@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, thinned
+from camcomp.diagnosis.fit.cause_sets import CausePrior
 from camcomp.diagnosis.fit.columns import (
     Columns,
     build,
@@ -24,7 +25,6 @@ from camcomp.diagnosis.fit.patterns import Dictionary, dictionary
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.noise import HEALTHY, MINOR
 from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
-from camcomp.diagnosis.statistics.cause_sets import CausePrior
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.folds import Folds, Split
 from camcomp.diagnosis.statistics.noise_model import Noise

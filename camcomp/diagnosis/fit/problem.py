@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, cause_of, step_of
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, Scale
 from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
 from camcomp.diagnosis.fit.floor import NoiseFloor, roundings
 from camcomp.diagnosis.fit.grid_parameters import longest, reach
@@ -14,9 +15,9 @@ from camcomp.diagnosis.fit.noise import inflation
 from camcomp.diagnosis.fit.patterns import KINDS, Dictionary
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.model.discrepancy import ROWS_OF_PROCESS
+from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale
 from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams

@@ -7,17 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camcomp.diagnosis.fit.cause_sets import Fitted, parts_of, temperature_of
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import TermBench, spots
 from camcomp.diagnosis.law.describe import law_result, moved_without
 from camcomp.diagnosis.law.find import BETTER, FoundLaw, find_law, find_map
 from camcomp.diagnosis.law.screen import term_grids
+from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.result.types import Law
 from camcomp.diagnosis.search.unknown import firm_prior
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, parts_of, temperature_of
 from camcomp.diagnosis.statistics.evidence import FREE, Prior
 from camcomp.diagnosis.statistics.folds import Folds, Split, usual_split
 from camcomp.ground.datatypes import Floats

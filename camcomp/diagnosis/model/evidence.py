@@ -25,12 +25,12 @@ from camcomp.diagnosis.model.group import (
     normal_equations,
 )
 from camcomp.diagnosis.model.noise import HEALTHY
-from camcomp.diagnosis.statistics.cause_sets import SIZES
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
 from camcomp.diagnosis.statistics.posterior import AmplitudePosterior, weigh
 from camcomp.ground.datatypes import Floats, Ints
 
 WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: effect of a cause on the channels
+SIZES = (0.45, 0.33, 0.13, 0.055, 0.022, 0.009, 0.004)  # prior probability of 0, 1, 2 ... causes
 LONG = 20  # columns: a longer candidate has no small errors
 FREE = 1e-6  # precision of nuisances in units of their columns
 LEAST_VISIBLE = 1e-6  # of a column's size: what nuisances leave of it; below, the column is not seen

@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.words import listed
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE, MOST_SETS
@@ -27,7 +28,6 @@ from camcomp.diagnosis.next_experiment.information_gain import ExpectedGain, pre
 from camcomp.diagnosis.next_experiment.predicted_logs import ONLY_NOISE, Question, predict_logs
 from camcomp.diagnosis.next_experiment.ready_program import can_be_run
 from camcomp.diagnosis.next_experiment.site import Site, site_of
-from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 from camcomp.model.job import Job
 from camcomp.report.plot import brief

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.predicted_logs import PredictedLogs, Question, seen_apart
-from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.probability import SEED, TEMPERATURE
 from camcomp.ground.datatypes import Floats
 

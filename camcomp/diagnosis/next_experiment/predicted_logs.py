@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from camcomp.diagnosis.experiment.driven_run import axes_along
 from camcomp.diagnosis.fit.bench import MOST_ROWS, Bench, Run
+from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.columns import build
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.noise import inflation
@@ -21,7 +22,6 @@ from camcomp.diagnosis.model.classes import HIDDEN, LARGE
 from camcomp.diagnosis.next_experiment.candidates import Candidate
 from camcomp.diagnosis.next_experiment.site import Site, site_of
 from camcomp.diagnosis.result.types import NamedCause
-from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate, posterior
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats, Ints

@@ -5,10 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camcomp.diagnosis.fit.cause_sets import Fitted, probabilities, temperature_of
 from camcomp.diagnosis.fit.gap import is_at_floor
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
+from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.folds import ABOVE
 from camcomp.diagnosis.model.search import ROUNDS
 from camcomp.diagnosis.model.verdict import Word, decide
@@ -16,12 +18,6 @@ from camcomp.diagnosis.search.credible import MODELLED, credibility, with_unmode
 from camcomp.diagnosis.search.fitted_sets import FittedSets
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
-from camcomp.diagnosis.statistics.cause_sets import (
-    Fitted,
-    Members,
-    probabilities,
-    temperature_of,
-)
 from camcomp.diagnosis.statistics.evidence import misfit
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
 from camcomp.diagnosis.statistics.score_test import Shares

@@ -21,13 +21,13 @@ from math import log
 import numpy as np
 from scipy.special import logsumexp
 
+from camcomp.diagnosis.fit.cause_sets import Fitted, Scale, parts_of
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.discrepancy import UNKNOWN, gains_at_scales
 from camcomp.diagnosis.model.imitation import probability_with_unmodelled
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.search.unknown import joint_products, process_in_time
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Scale, parts_of
 from camcomp.diagnosis.statistics.evidence import posterior
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.diagnosis.statistics.probability import TEMPERATURE
@@ -82,9 +82,8 @@ def _alone(problem: Problem, f: Fitted, data: NormalEquations, prior: float) -> 
     """Every part of a set by normal equations; prior: log prior of what these hold beside the set."""
     scale, out = Scale(data, problem.prior, problem.candidates), []
     for some in parts_of(f.members):
-        value = scale.none(some) + scale.worth([(i,) for i in some])
         there = tuple(float(i in some) for i in f.members)
-        out.append(_Hypothesis(value, problem.candidates.prior(some) + prior, there))
+        out.append(_Hypothesis(scale(some), problem.candidates.prior(some) + prior, there))
     return out
 
 

@@ -6,41 +6,17 @@ the search is repeated about the best fit until it is the same again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
+from camcomp.diagnosis.fit.cause_sets import Fitted, Scale, scored
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
-from camcomp.diagnosis.model.evidence import Reduced
+from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.search import SLACK, search_sets
-from camcomp.diagnosis.statistics.cause_sets import (
-    Fitted,
-    Members,
-    Scale,
-    scored,
-)
-from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS, estimate
+from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground import progress
 
 TRIED = 5  # sets fitted about a fit that are larger than it, as many of those that are not, and of single causes
-
-
-def linear_sets(scale: Scale, places: Sequence[tuple[str, str | None]]) -> Reduced:
-    """Sets weighed by the evidence linearised about one fit, tolerances as stated, the causes of a set of one width in their
-    typical sizes; places: effect and target of every candidate.
-    """
-    columns, data = scale.candidates.columns, scale.at.data
-    gram, moment = scale.at.blocks_without([np.arange(len(data.b))])[0]
-    most = np.full(len(data.b), np.inf)
-    return Reduced(
-        candidates=[PlacedCause(*place, own) for place, own in zip(places, columns, strict=True)],
-        units=[np.full(len(own), float(data.A[own, own].any())) for own in columns],
-        bounds=AmplitudeBounds(-most, most, scale.prior.sign, most < 0.0), prior=scale.candidates.prior, gram=gram,
-        moment=moment, none=scale.at.log_evidence, widths=PRIOR_WIDTHS,
-    )  # fmt: skip
 
 
 class FittedSets:
@@ -68,7 +44,7 @@ class FittedSets:
         self.searched.add(near.members)
         problem = self.problem
         scale = Scale(near.data, problem.prior, problem.candidates)
-        sets = linear_sets(scale, [(c.name, c.target) for c in problem.columns.candidates])
+        sets = scale.sets(range(len(problem.candidates.columns)))
         found = search_sets(sets)
         larger = {members for members in found if len(members) > len(near.members)}
         for some in (larger, found.keys() - larger - self.done.keys()):

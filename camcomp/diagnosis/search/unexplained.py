@@ -15,11 +15,11 @@ import numpy as np
 from scipy.special import log_ndtr, ndtri
 
 from camcomp.diagnosis.fit.bench import thinned
+from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.floor import row_scatter, swings
 from camcomp.diagnosis.fit.outliers import TINY
 from camcomp.diagnosis.fit.patterns import KINDS
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.diagnosis.statistics.probability import SURELY

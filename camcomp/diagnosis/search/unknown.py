@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import eigh
 
+from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
 from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SCALES
+from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram, posterior
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
 from camcomp.diagnosis.statistics.score_test import Shares, score_test

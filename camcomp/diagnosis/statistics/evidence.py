@@ -1,31 +1,25 @@
-"""Which causes: Gaussian evidence of sets of effects, in closed form from Gram matrices.
+"""Columns of programs under the tolerances of healthy machines.
 
-The white residual is r = D a + e. Columns D belong to effects, to nuisances and to what every healthy machine has.
-Every effect has the narrow prior of its tolerance: a machine is never exactly its model, and what is within tolerance is no
-finding. One that is a cause has an amplitude beside it with the wide prior of its own size, a mixture of four widths. All are
-integrated out exactly (`posterior.py`). A tolerance has an end, its reach: what is farther off is a
-cause by definition, and a set that would need it without naming it pays for holding it back (Laplace's approximation
-of the normal distributions that are cut off there; the mode by active sets, Nocedal and Wright, Numerical
-Optimization, 16.5).
+The white residual is r = D a + e. Columns D belong to effects, to nuisances and to what every healthy machine has. Every
+one has the narrow prior of its tolerance: a machine is never exactly its model, and what is within tolerance is no finding. A
+tolerance has an end, its reach: what is farther off is a cause by definition, and a set that would need it without naming
+it pays for holding it back (Laplace's approximation of the normal distributions that are cut off there; the mode by active
+sets, Nocedal and Wright, Numerical Optimization, 16.5).
 
-Source: group selection with amplitude mixtures; the half-normal signs follow the priors that the effects state, and the
-widths, equally likely, are nearly flat in the logarithm of a size, from a hundredth of the typical one to three: a calibrated
-machine has of everything what its calibration could just not see, and of two causes that do the same the one whose typical
-size is larger is no less likely for it. Positive parameters enter by the posterior probability of their sign.
+A cause has an amplitude beside its tolerance, of one of PRIOR_WIDTHS typical sizes. These are nearly flat in the logarithm of
+a size: a calibrated machine has of everything what its calibration could just not see, and of two causes that do the same
+the one whose typical size is larger is no less likely for it.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
-from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.special import log_ndtr
 
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
-from camcomp.diagnosis.statistics.posterior import AmplitudePosterior, weigh
+from camcomp.diagnosis.statistics.posterior import AmplitudePosterior
 from camcomp.ground.datatypes import Floats, Ints
 
 PRIOR_WIDTHS = (0.02, 0.1, 0.5, 2.5)
@@ -71,23 +65,6 @@ def posterior(
     precision[list(members)] = FREE
     precision[list(absent)] = np.inf
     return AmplitudePosterior.of(data, precision)
-
-
-def log_bayes(equations: tuple[Floats, Floats], sign: Floats, cause: Ints) -> float:
-    """Log Bayes factor of a set whose columns belong to the causes (d,) against none.
-
-    equations: normal equations (d, d), (d,) of their amplitudes, with all else integrated out. sign (d,): of these.
-    """
-    sizes, on = _widths(int(cause[-1]) + 1)[:, cause], np.arange(len(cause))
-    _, value, mean, sd = weigh(*equations, (on[:0], on[None]), (sizes[:, :0], sizes[None]))
-    value += np.where(sign > 0, log_ndtr(mean / sd) + np.log(2.0), 0.0).sum(axis=2)
-    return float(log_sum(value[0]) - np.log(len(sizes)))
-
-
-@cache
-def _widths(count: int) -> Floats:
-    """Widths (w, count) that so many causes may have, equally likely."""
-    return np.array(list(product(PRIOR_WIDTHS, repeat=count)))
 
 
 def estimate(data: NormalEquations, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:

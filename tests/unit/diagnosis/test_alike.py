@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, Scale
 from camcomp.diagnosis.search.cause_search import _same
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Scale
 from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 

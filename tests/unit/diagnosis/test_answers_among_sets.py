@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, probabilities
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search import fitted_sets
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, probabilities
 
 
 def test_small_members_move_the_tip_by_less_than_is_minor():

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted
 from camcomp.diagnosis.search import credible
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted
 from camcomp.diagnosis.statistics.evidence import Prior
 
 ROWS = 400

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Scale, scored
 from camcomp.diagnosis.model.search import best_of, search_sets
-from camcomp.diagnosis.search.fitted_sets import linear_sets
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale, scored
 from camcomp.diagnosis.statistics.evidence import Prior, gram
 
 SPRINGS, FORCE, WEIGHT, LENGTH, TWO = (0, 1, 2, 3), 4, 5, 6, 7
@@ -21,7 +20,7 @@ def scale(D, r, excluded=2):
 
 
 def sets(D, r, excluded=2):
-    return linear_sets(scale(D, r, excluded), [(str(i), None) for i in range(8)])
+    return scale(D, r, excluded).sets(range(8))
 
 
 def drawn(seed):
@@ -46,10 +45,11 @@ def test_a_cause_of_two_columns_is_found_and_never_jointly_with_one_that_it_excl
     assert not [members for members in found if {0, TWO} <= set(members)]
 
 
-def test_sets_are_worth_nearly_what_they_are_where_every_cause_has_a_width_of_its_own():
+def test_the_search_weighs_sets_as_they_are_ranked_where_no_tolerance_ends():
     D, noise = drawn(4)
     r = 0.3 * D[:, 0] + 0.2 * D[:, FORCE] + noise
     data, own = sets(D, r), scale(D, r)
-    for members in ((0,), (0, 1), (0, FORCE), (0, FORCE, TWO)):
-        exact = own.at.log_evidence + own.worth([(i,) for i in members]) + own.candidates.prior(members)
-        assert data.value(members) == pytest.approx(exact, abs=1.5)
+    for members in ((), (0,), (0, 1), (0, FORCE), (0, FORCE, TWO)):
+        assert data.value(members) == pytest.approx(own(members) + own.candidates.prior(members))
+    more = data.with_one_more((0,), [1, FORCE])
+    assert more == pytest.approx([data.value((0, 1)), data.value((0, FORCE))])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.answer.held_out import causes_without
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Scale, probabilities
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Fitted, Scale, probabilities
 from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
 from camcomp.diagnosis.statistics.normal_equations import sum_grams
 

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.intervals import FORMULA, STATED, joint_covariance
 from camcomp.diagnosis.search.unknown import followed
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import Prior
 
 

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.search.cause_search import _stated, above_floor, unknown_kind
 from camcomp.diagnosis.search.unexplained import Unexplained
-from camcomp.diagnosis.statistics.cause_sets import Fitted
 
 PROBLEM = SimpleNamespace(
     floor=SimpleNamespace(tip_um=5.0),

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import lsq_linear
 from scipy.stats import norm
 
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale
+from camcomp.diagnosis.fit.cause_sets import CausePrior, Scale
 from camcomp.diagnosis.statistics.evidence import (
     PRIOR_WIDTHS,
     Prior,
@@ -34,8 +34,8 @@ def data(truth, n=300, k=4, seed=1):
 
 def worth(g, p, *causes):
     """Log Bayes factor of causes with these columns."""
-    candidates = CausePrior(causes, np.zeros(len(causes)), lambda i, j: False)
-    return Scale(g, p, candidates).worth([(i,) for i in range(len(causes))])
+    scale = Scale(g, p, CausePrior(causes, np.zeros(len(causes)), lambda i, j: False))
+    return scale(tuple(range(len(causes)))) - scale(())
 
 
 def test_bayes_factor_of_one_cause_is_the_integral_it_stands_for():

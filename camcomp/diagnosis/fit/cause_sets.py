@@ -1,32 +1,25 @@
-"""Searching the sets of up to three causes: all sets that look good linearly, re-fitted through the twin, then ranked.
+"""Sets of causes of programs: what is known of a fitted one, their prior, and their evidence at one state of the machine.
 
-The search knows grams, priors and numbers of candidates; what an candidate is, and how it is re-fitted, its caller says.
+The evidence is that of model/evidence, with tolerances in place of spikes (`statistics/evidence.py`) and slabs in typical sizes.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import comb, factorial
 
 import numpy as np
 
-from camcomp.diagnosis.statistics.evidence import (
-    Prior,
-    holding_back,
-    log_bayes,
-    log_sum,
-    misfit,
-    posterior,
-)
+from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
+from camcomp.diagnosis.model.evidence import SIZES, Members, Reduced
+from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS, Prior, holding_back, log_sum, misfit, posterior
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
 from camcomp.diagnosis.statistics.probability import EVEN, TEMPERATURE
 from camcomp.ground.datatypes import Floats
 
-Members = tuple[int, ...]
 PATTERN = 3  # targets of one effect from which on they may have one origin: springs of several joints are one thing that gives way
 ALL_PARTS = 3  # members up to which every part of a set is looked at; of larger ones all but one, each alone, and none
-SIZES = (0.45, 0.33, 0.13, 0.055, 0.022, 0.009, 0.004)  # prior probability of 0, 1, 2 ... causes
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -75,24 +68,20 @@ class CausePrior:
         members = tuple(sorted(members))
         if (members, minor) not in self._priors:
             apart = any(self.exclusive(*both) for both in combinations(members, 2))
-            odds = [each for each, _ in self.ways(members, minor)]
-            self._priors[members, minor] = -np.inf if apart else log_sum(odds)
+            self._priors[members, minor] = -np.inf if apart else log_sum(self._ways(members, minor))
         return self._priors[members, minor]
 
     def value(self, f: Fitted, temperature: float = 1.0) -> float:
         """Tempered log evidence of a set with its minor effects, plus their log prior."""
         return f.log_evidence / temperature + self.prior(f.members, f.minor)
 
-    def ways(self, members: Members, minor: Members = ()) -> list[tuple[float, list[Members]]]:
-        """How a set may have come about: the log prior probability of each way, and members that are of one size in it.
+    def _ways(self, members: Members, minor: Members) -> list[float]:
+        """Log prior probability of each way in which a set may have come about.
 
-        One by one, each of a size of its own; or one effect at several targets is one cause, by whatever all of these have
-        in common. Minor ones have no part in common with them: three of a kind are one thing, two and a minor one are not.
+        One by one; or one effect at several targets is one cause, by whatever all of these have in common. Minor ones have no
+        part in common with them: three of a kind are one thing, two and a minor one are not.
         """
-        one_by_one: list[Members] = [(i,) for i in (*members, *minor)]
-        ways = [(_in_any_order([float(self.weight[i]) for (i,) in one_by_one]), one_by_one)]
-        if len(members) < PATTERN:
-            return ways
+        ways = [_in_any_order([float(self.weight[i]) for i in (*members, *minor)])]
         groups = [(tuple(i for i in members if i in kind), len(kind)) for kind in self.kinds]
         groups = [(mine, of) for mine, of in groups if len(mine) >= PATTERN]
         if not groups:
@@ -103,8 +92,7 @@ class CausePrior:
             more = 0.5 ** np.arange(of - PATTERN + 1)  # halving with every further target, and any so many of them
             these = more[len(mine) - PATTERN] / more.sum() / comb(of, len(mine))
             weights.append(float(self.weight[mine[0]]) + float(np.log(of * these)))
-        shared = len(groups) * float(np.log(EVEN)) + _in_any_order(weights)
-        return [*ways, (shared, [*(mine for mine, _ in groups), *((i,) for i in rest)])]
+        return [*ways, len(groups) * float(np.log(EVEN)) + _in_any_order(weights)]
 
 
 def _in_any_order(weights: Sequence[float]) -> float:
@@ -135,25 +123,26 @@ class Scale:
         self.at = posterior(data, prior)
 
     def __call__(self, members: Members) -> float:
-        """Log evidence of a set."""
-        ways = self.candidates.ways(members)
-        odds = np.array([each for each, _ in ways])
-        return self.none(members) + log_sum(odds + [self.worth(groups) for _, groups in ways]) - log_sum(odds)
-
-    def none(self, members: Members) -> float:
-        """Log evidence of no cause, with all but members within reach."""
+        """Log evidence of a set, with all that is no member within reach."""
         columns = [c for i in members for c in self.candidates.columns[i]]
-        return self.at.log_evidence - holding_back(self.at, self.prior, columns)
+        linear = self.sets(members).value(tuple(range(len(members)))) - self.candidates.prior(members)
+        return linear - holding_back(self.at, self.prior, columns)
 
-    def worth(self, groups: Sequence[Members]) -> float:
-        """Log Bayes factor of members against none; those of a group are of one size."""
-        columns = [[c for i in group for c in self.candidates.columns[i]] for group in groups]
-        on = np.array([c for own in columns for c in own], int)
-        cause = np.repeat(np.arange(len(groups)), [len(own) for own in columns])
-        if not len(on):
-            return 0.0
-        equations = self.at.blocks_without([on])[0]
-        return log_bayes(equations, self.prior.sign[on], cause)
+    def sets(self, some: Sequence[int]) -> Reduced:
+        """Sets of some candidates, weighed by the evidence linearised about one fit, tolerances as stated; the causes of a set have one
+        width in their typical sizes.
+        """
+        columns = [self.candidates.columns[i] for i in some]
+        on, ends = np.array([c for own in columns for c in own], int), np.cumsum([0, *map(len, columns)]).tolist()
+        gram, moment = self.at.blocks_without([on])[0]
+        most, seen = np.full(len(on), np.inf), np.diag(self.at.data.A) > 0.0
+        return Reduced(
+            candidates=[PlacedCause(str(i), None, tuple(range(*at))) for i, at in zip(some, pairwise(ends), strict=True)],
+            units=[np.full(len(own), float(seen[list(own)].any())) for own in columns],
+            bounds=AmplitudeBounds(-most, most, self.prior.sign[on], most < 0.0), gram=gram, moment=moment,
+            prior=lambda members: self.candidates.prior(tuple(some[i] for i in members)),
+            none=self.at.log_evidence, widths=PRIOR_WIDTHS,
+        )  # fmt: skip
 
 
 def scored(scale: Scale, sets: Iterable[Members]) -> list[tuple[float, Members]]:

@@ -6,15 +6,14 @@ from math import comb
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.model.search import best_of, search_sets
-from camcomp.diagnosis.search.cause_search import rank
-from camcomp.diagnosis.search.fitted_sets import linear_sets
-from camcomp.diagnosis.statistics.cause_sets import (
+from camcomp.diagnosis.fit.cause_sets import (
     SIZES,
     CausePrior,
     Fitted,
     Scale,
 )
+from camcomp.diagnosis.model.search import best_of, search_sets
+from camcomp.diagnosis.search.cause_search import rank
 from camcomp.diagnosis.statistics.evidence import Prior, gram
 
 
@@ -30,7 +29,7 @@ def fitted(*members):
 
 def found_in(scale):
     """The best set of candidates of one column each."""
-    return best_of(search_sets(linear_sets(scale, [(str(i), None) for i in range(len(scale.candidates.columns))])))
+    return best_of(search_sets(scale.sets(range(len(scale.candidates.columns)))))
 
 
 @pytest.mark.parametrize("size", [0, 1, 2, 3])
@@ -72,16 +71,14 @@ def test_one_effect_at_three_targets_is_likelier_than_three_effects_and_at_two_i
     assert kinds.prior((0, 1, 2)) > kinds.prior((0, 1, 2, 3))
 
 
-def test_what_has_one_origin_is_of_one_size():
+def test_causes_of_a_set_are_of_one_size():
     """Rows that two columns explain equally well: one at the size of its mates, or its twin at eight times that."""
     rng = np.random.default_rng(7)
     D = rng.standard_normal((400, 8))
     D[:, 3] = D[:, 2] / 8.0
     prior = Prior(np.full(8, 1e-3), np.zeros(8), np.full(8, np.inf))
-    data = gram(D, D[:, :3] @ np.full(3, 0.3) + rng.standard_normal(400))
-    kinds = CausePrior(*(getattr(candidates(8), name) for name in ("columns", "weight", "exclusive")), ((0, 1, 2, 3),))
-    apart, together = (Scale(data, prior, each) for each in (candidates(8), kinds))
-    assert together((0, 1, 2)) - together((0, 1, 3)) > apart((0, 1, 2)) - apart((0, 1, 3)) + 1.0
+    scale = Scale(gram(D, D[:, :3] @ np.full(3, 0.3) + rng.standard_normal(400)), prior, candidates(8))
+    assert scale((0, 1, 2)) > scale((0, 1, 3)) + 1.0
 
 
 def test_a_rival_is_another_set_that_is_neither_larger_nor_the_same_with_one_more_or_less():
