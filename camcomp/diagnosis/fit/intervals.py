@@ -12,8 +12,7 @@ import numpy as np
 from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.evidence import FREE, gram, within
-from camcomp.diagnosis.statistics.normal_equations import sum_grams
-from camcomp.diagnosis.statistics.posterior import AmplitudePosterior
+from camcomp.diagnosis.statistics.normal_equations import AmplitudePosterior, sum_grams
 from camcomp.ground.datatypes import Floats
 
 FORMULA = 0.005  # share of its size by which an effect's formula itself is off: no guide turns round as Dahl wrote

@@ -25,8 +25,7 @@ from camcomp.diagnosis.model.group import (
     normal_equations,
 )
 from camcomp.diagnosis.model.noise import HEALTHY
-from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
-from camcomp.diagnosis.statistics.posterior import AmplitudePosterior, weigh
+from camcomp.diagnosis.statistics.normal_equations import AmplitudePosterior, NormalEquations, sum_grams
 from camcomp.ground.datatypes import Floats, Ints
 
 WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: effect of a cause on the channels
@@ -287,13 +286,38 @@ class Reduced:
         return dict(zip(self.indices(members), (width * self.units_of(members)).tolist(), strict=True))
 
     def _posterior(self, members: Members, more: Sequence[int]) -> tuple[Floats, Floats]:
-        """Log evidence (s, widths) and amplitudes (s, widths, d) of a set with one of s candidates more, each of e columns."""
+        """Log evidence (s, widths) and amplitudes (s, widths, d) of a set with one of s candidates more, each of e columns.
+
+        The columns of the set are eliminated once.
+        """
         old, new = np.array(self.indices(members), int), np.array([self.candidates[i].columns for i in more])
-        units = self.units_of(members), np.array([self.units[i] for i in more])[:, None]
-        sizes = np.outer(self.widths, units[0]), np.array(self.widths)[:, None] * units[1]
-        common, own, mean, sd = weigh(self.gram, self.moment, (old, new), sizes)
+        a, b = self.units_of(members), np.array([self.units[i] for i in more])
+        square = np.array(self.widths) ** 2
+        A = a[:, None] * self.gram[np.ix_(old, old)] * a + np.eye(len(a)) / square[:, None, None]  # (widths, o, o)
+        B = a[:, None] * self.gram[old[:, None], new[:, None, :]] * b[:, None, :]  # (s, o, e)
+        C = b[:, :, None] * self.gram[new[:, :, None], new[:, None, :]] * b[:, None, :]
+        P = np.linalg.inv(A)
+        alone = P @ (a * self.moment[old])  # (widths, o)
+        taken = np.einsum("wop,spe->swoe", P, B, optimize=True)
+        S = C[:, None] + np.eye(b.shape[1]) / square[:, None, None]
+        S = S - np.einsum("soe,swof->swef", B, taken, optimize=True)
+        Q = np.linalg.inv(S)
+        left = (b * self.moment[new])[:, None] - np.einsum("soe,wo->swe", B, alone, optimize=True)
+        gained = (Q @ left[..., None])[..., 0]
+        value = 0.5 * ((alone @ (a * self.moment[old]))[None] + (left * gained).sum(axis=2))
+        value -= 0.5 * (np.linalg.slogdet(A)[1] + np.linalg.slogdet(S)[1] + (len(a) + b.shape[1]) * np.log(square))
+        mean = np.concatenate([alone[None] - (taken @ gained[..., None])[..., 0], gained], axis=2)
+        variance = np.concatenate(
+            [
+                np.diagonal(P, axis1=1, axis2=2)[None] + ((taken @ Q) * taken).sum(axis=3),
+                np.diagonal(Q, axis1=2, axis2=3),
+            ],
+            axis=2,
+        )
         on = np.concatenate([np.broadcast_to(old, (len(new), len(old))), new], axis=1)[:, None, :]
-        return common + own + self._inside(mean, sd, on), mean
+        unit = np.concatenate([np.broadcast_to(a, (len(b), len(a))), b], axis=1)[:, None, :]
+        mean, sd = unit * mean, unit * np.sqrt(np.maximum(variance, 0.0))
+        return value + self._inside(mean, sd, on), mean
 
     def _inside(self, mean: Floats, sd: Floats, on: np.ndarray) -> Floats:
         """Log share (s, widths) of the posterior that has the right signs; minus infinity far outside of the bounds."""

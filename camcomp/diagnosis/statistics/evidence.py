@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.normal_equations import NormalEquations
-from camcomp.diagnosis.statistics.posterior import AmplitudePosterior
+from camcomp.diagnosis.statistics.normal_equations import AmplitudePosterior, NormalEquations
 from camcomp.ground.datatypes import Floats, Ints
 
 PRIOR_WIDTHS = (0.02, 0.1, 0.5, 2.5)

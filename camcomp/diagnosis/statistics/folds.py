@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.normal_equations import NormalEquations
-from camcomp.diagnosis.statistics.posterior import AmplitudePosterior
+from camcomp.diagnosis.statistics.normal_equations import AmplitudePosterior, NormalEquations
 from camcomp.ground.datatypes import Floats, Ints
 
 PARTS = 4  # of a whole that are looked at one by one: of a log, of a run, of a disturbance
