@@ -13,7 +13,7 @@ import numpy as np
 
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
 from camcomp.diagnosis.model.evidence import SIZES, Members, Reduced
-from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS, Prior, holding_back, log_sum, misfit, posterior
+from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS, Prior, holding_back, misfit, posterior
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
 from camcomp.diagnosis.statistics.probability import EVEN, TEMPERATURE
 from camcomp.ground.datatypes import Floats
@@ -68,7 +68,7 @@ class CausePrior:
         members = tuple(sorted(members))
         if (members, minor) not in self._priors:
             apart = any(self.exclusive(*both) for both in combinations(members, 2))
-            self._priors[members, minor] = -np.inf if apart else log_sum(self._ways(members, minor))
+            self._priors[members, minor] = -np.inf if apart else float(np.logaddexp.reduce(self._ways(members, minor)))
         return self._priors[members, minor]
 
     def value(self, f: Fitted, temperature: float = 1.0) -> float:
@@ -153,5 +153,4 @@ def scored(scale: Scale, sets: Iterable[Members]) -> list[tuple[float, Members]]
 def probabilities(fits: Sequence[Fitted], candidates: CausePrior, temperature: float = 1.0) -> Floats:
     """Posterior probability of every set among those fitted."""
     value = np.array([candidates.value(f, temperature) for f in fits])
-    out: Floats = np.exp(value - log_sum(value))
-    return out
+    return np.asarray(np.exp(value - np.logaddexp.reduce(value)))

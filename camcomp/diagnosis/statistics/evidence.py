@@ -26,13 +26,6 @@ FREE = 0.01  # precision of a cause while it is fitted: within 10 scales
 PASSES = 30  # of the search for columns at the end of their reach
 
 
-def log_sum(values: Sequence[float] | Floats) -> float:
-    """Logarithm of the sum of the exponentials of values (n,): scipy's costs more than all else that is done with a few of them."""
-    v = np.asarray(values)
-    most = float(v.max())
-    return most + float(np.log(np.exp(v - most).sum())) if np.isfinite(most) else most
-
-
 def gram(D: Floats | ByChannel, r: Floats) -> NormalEquations:
     """From white columns D (w, k) and residual r (w,)."""
     turned: Any = D.T  # of an array or a ByChannel
