@@ -28,7 +28,6 @@ class Fitted:
 
     members: Members
     theta: Floats
-    covariance: Floats
     log_evidence: float
     grams: tuple[NormalEquations, ...]  # per run, about the fit, in absolute coordinates
     extra: Mapping[int, Mapping[str, float]] = field(default_factory=dict)  # scanned shapes by candidate

@@ -200,9 +200,9 @@ class Problem:
             both = [np.column_stack([own, self._pushed(k, farther)]) for k, own in enumerate(white)]
             grams = self._grams_at([*index, *pushed], both, left)
         scale = Scale(sum_grams(grams), self.prior, self.candidates)
-        mean, covariance = estimate(sum_grams(grams), self.prior, index)
+        theta = self._bounded(members, estimate(sum_grams(grams), self.prior, index)[0][index])
         return Fitted(
-            members=members, theta=self._bounded(members, mean[index]), covariance=covariance, log_evidence=scale(members), grams=grams,
+            members=members, theta=theta, log_evidence=scale(members), grams=grams,
             extra=shapes, white=tuple(white), residual=tuple(left), farther=farther,
         )  # fmt: skip
 
@@ -244,11 +244,8 @@ class Problem:
         standard deviations.
         """
         members = f.members if members is None else members
-        index, at = self.member_columns(members), self.member_columns(f.members)
-        if len(f.grams) == 1 or not members:
-            here = np.array([at.index(c) for c in index], int)
-            return f.theta[here], np.sqrt(np.diag(f.covariance))[here]
-        mean, covariance = estimate(f.without(k), self.prior, index)
+        index = self.member_columns(members)
+        mean, covariance = estimate(f.without(k) if len(f.grams) > 1 else f.data, self.prior, index)
         return self._bounded(members, mean[index]), np.sqrt(np.diag(covariance))
 
     def _stacked(self, k: int, moved: Sequence[Floats | None], index: Sequence[int]) -> Floats:

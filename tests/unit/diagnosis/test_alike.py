@@ -24,7 +24,6 @@ def problem_of(twin):
         Fitted(
             members=(i,),
             theta=estimate(data, prior, [i])[0][[i]],
-            covariance=np.eye(1),
             log_evidence=scale((i,)),
             grams=(data,),
         )

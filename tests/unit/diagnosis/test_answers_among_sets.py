@@ -20,9 +20,7 @@ FREE = CausePrior(tuple((i,) for i in range(6)), np.log(np.full(6, 1 / 6)), lamb
 
 
 def fitted(evidence, *members):
-    return Fitted(
-        members=members, theta=np.zeros(len(members)), covariance=np.eye(len(members)), log_evidence=evidence, grams=()
-    )
+    return Fitted(members=members, theta=np.zeros(len(members)), log_evidence=evidence, grams=())
 
 
 @pytest.fixture

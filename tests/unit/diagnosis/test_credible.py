@@ -28,9 +28,7 @@ def present(monkeypatch, column, left, *, surely=False):
     )  # fmt: skip
     monkeypatch.setattr(credible, "_weights", lambda _: [np.ones(ROWS)])
     amount = float(column @ left / (column @ column))
-    f = Fitted(
-        members=(0,), theta=np.array([amount]), covariance=np.eye(1), log_evidence=0.0, grams=(), residual=(left,)
-    )
+    f = Fitted(members=(0,), theta=np.array([amount]), log_evidence=0.0, grams=(), residual=(left,))
     there, replaced = credible.credibility(problem, f, surely=surely)
     return there[0], replaced[0]
 

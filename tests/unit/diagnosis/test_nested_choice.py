@@ -51,7 +51,6 @@ def experiment(sizes, weights, *, only_last=False):
         return Fitted(
             members=members,
             theta=theta,
-            covariance=np.eye(len(members)),
             log_evidence=scale(members),
             grams=tuple(runs),
         )

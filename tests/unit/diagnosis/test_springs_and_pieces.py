@@ -30,7 +30,6 @@ def deviation_of_force(apart, *, log=True):
     fit = Fitted(
         members=(0,),
         theta=np.array([0.1]),
-        covariance=np.eye(1),
         log_evidence=0.0,
         grams=(),
         white=(D[:, :1],),
@@ -73,9 +72,4 @@ def test_rows_follow_what_acts_while_they_are_read(seen_um, answer):
         columns=SimpleNamespace(blocks=(ByChannel.of(channels),)), member_columns=list, causes=lambda *a: [],
         floor=SimpleNamespace(axis_mm=0.003),
     )  # fmt: skip
-    assert (
-        followed(
-            problem, Fitted(members=(0,), theta=np.array([shift]), covariance=np.eye(1), log_evidence=0.0, grams=()), 0
-        )
-        is answer
-    )
+    assert followed(problem, Fitted(members=(0,), theta=np.array([shift]), log_evidence=0.0, grams=()), 0) is answer

@@ -20,7 +20,7 @@ PROBLEM = SimpleNamespace(
 )
 def test_causes_that_undo_each_other_are_modelled_no_better_for_it(first, second, shown):
     """3 um jointly with a force of 45 um and links that take 32 of them away again; but not beside two that leave 10 of 200."""
-    f = Fitted(members=(0, 1), theta=np.array([first, second]), covariance=np.eye(2), log_evidence=0.0, grams=())
+    f = Fitted(members=(0, 1), theta=np.array([first, second]), log_evidence=0.0, grams=())
     beyond = {"tip": Unexplained("tip", excess_um=3.0, z=8.0)}
     assert unknown_kind(PROBLEM, f, beyond) == shown
     assert above_floor(PROBLEM, beyond)

@@ -22,9 +22,7 @@ def candidates(n):
 
 
 def fitted(*members):
-    return Fitted(
-        members=members, theta=np.zeros(len(members)), covariance=np.eye(len(members)), log_evidence=0.0, grams=()
-    )
+    return Fitted(members=members, theta=np.zeros(len(members)), log_evidence=0.0, grams=())
 
 
 def found_in(scale):
