@@ -14,7 +14,6 @@ from camcomp.ground.files import display_name, read_bytes
 from camcomp.ground.records import dataclass, replace
 from camcomp.model.config import linuxcnc_ini
 from camcomp.model.config.base import Spec
-from camcomp.model.config.doubt import Doubt
 from camcomp.model.config.robot import RevoluteActuator, RobotSpec
 from camcomp.model.config.spec import Config, EffectChoice, Experiment
 from camcomp.model.config.spread import Spread, UncertainInput, replaced, without_spreads
@@ -24,11 +23,7 @@ from camcomp.model.config.write_back import key_of_effect, merged_entries
 from camcomp.model.config.yaml_check import check, choose
 from camcomp.model.config.yaml_tree import Node, merge, plain, read_tree, tree_of
 
-ROBOT_KEYS = (
-    "name",
-    "source",
-    "start_reference_mm",
-)  # belong to the robot, whatever plug-in builds its chains
+ROBOT_KEYS = ("name", "source", "start_reference_mm")  # belong to the robot, whatever plug-in builds its chains
 
 _SECTIONS = tuple(key for spec in (Config, Experiment) for key in spec.yaml_keys() if key != "source")
 _SECTION = rb"(?m)(^|[{,])[ \t\"']*(%s)[\"']?[ \t]*:([ \t\r\n]|$)" % "|".join(_SECTIONS).encode()
@@ -46,14 +41,11 @@ def load_config(paths: Sequence[Path | str]) -> Config:
     if tree is None:
         _raise(errors)
         raise ConfigError("CC212", "no configuration is given", hint="name one with --config FILE")
-    tree, file_doubts, wrong_files = _with_other_files(tree)
     if _get(tree, "robot") is None:
         errors.append(ConfigError("CC212", "there is no section 'robot'", at=tree.at))
-    tree, spreads, more = _certain(tree)
-    config, wrong = _check_config(tree)
-    _raise([*errors, *wrong_files, *more, *wrong])
+    _, config, more = _checked(tree)
+    _raise([*errors, *more])
     assert config is not None
-    config._spreads, config._doubts = tuple(spreads), tuple(file_doubts)
     return in_stated_dialect(config)
 
 
@@ -64,15 +56,7 @@ def check_config(paths: Sequence[Path | str]) -> Config | None:
     load_config.
     """
     tree, errors = _read_merged(paths)
-    more: list[CamcompError] = []
-    config: Config | None = None
-    if tree is not None:
-        tree, file_doubts, wrong_files = _with_other_files(tree)
-        tree, spreads, more = _certain(tree)
-        config, wrong = _check_config(tree)
-        more += [*wrong_files, *wrong]
-        if config is not None:
-            config._spreads, config._doubts = tuple(spreads), tuple(file_doubts)
+    tree, config, more = (None, None, []) if tree is None else _checked(tree)
     if _get(tree, "robot", "name") is None:
         more = [each for each in more if each.rule != "CC203"]
     _raise([*errors, *more, *_force_files(_get(tree, "process", "force"))])
@@ -243,11 +227,15 @@ def _merged(base: Node, over: Node) -> Node:
     return replace(out, value={**out.value, "effects": replace(above, value=entries)})
 
 
-def _with_other_files(tree: Node) -> tuple[Node, list[Doubt], list[CamcompError]]:
-    """The tree with the travel of LinuxCNC's axes and the tools of tool tables, doubts, and errors."""
+def _checked(tree: Node) -> tuple[Node, Config | None, list[CamcompError]]:
+    """Merged files with the travel of LinuxCNC's axes and the tools of tool tables, their configuration, and the errors."""
     tree, doubts = linuxcnc_ini.with_travel(tree)
     tree, more, errors = with_tool_tables(tree)
-    return tree, doubts + more, errors
+    tree, spreads, uncertain = _certain(tree)
+    config, wrong = _check_config(tree)
+    if config is not None:
+        config._spreads, config._doubts = tuple(spreads), (*doubts, *more)
+    return tree, config, [*errors, *uncertain, *wrong]
 
 
 def _is_ours(tree: Node | None, data: bytes) -> bool:

@@ -171,23 +171,26 @@ class Track:
         """Cutting force on the tool (k, 3) N, program frame, for a tip driven along unit vectors direction (k, 3)."""
         if self.load is not None and feed is not None and not self.conditions.plunges:
             return self._driven(piece, w, direction, feed)
-        turn = self.path.orientation
+        c, turn, out = self.conditions, self.path.orientation, np.zeros((len(piece), 3))
+        cuts = self.cutting[piece] & (sizes(direction) > 0.0)
+        if c.model is None or not cuts.any():
+            return out
+        on = slice(None) if cuts.all() else np.flatnonzero(cuts)
         turned = None if turn is None else turn.rotations(self.motion[piece], self.u(piece, w))
-        return _force(
-            path=self.path,
-            c=self.conditions,
-            cutting=self.cutting,
-            motion=self.motion,
-            s0=self.s0,
-            length=self.length,
-            load=self.load,
-            piece=piece,
-            w=w,
-            direction=direction,
-            height=lambda on: self.points(piece[on], w[on])[:, 2],
-            driven=feed,
-            turned=turned,
-        )
+        seen = direction if turned is None else np.einsum("kji,kj->ki", turned, direction)  # in the frame of the tool
+        at, share = piece[on], w[on]
+        if self.load is not None and not c.plunges:
+            found = self.load.base(at, share)
+        else:
+            depth, width = (np.full(len(at), np.nan if each is None else each) for each in (c.depth_mm, c.width_mm))
+            if c.depth_mm is None and c.stock_top_mm is not None:
+                depth = c.stock_top_mm - self.points(at, share)[:, 2]
+            found = _components(
+                path=self.path, c=c, motion=self.motion[at], direction=seen[on], depth=depth, width=width,
+                s=self.s0[at] + share * self.length[at], ends=share == 1.0, driven=None if feed is None else feed[on],
+            )  # fmt: skip
+        out[on] = to_vector(found, seen[on], c.tool_axis)
+        return out if turned is None else np.einsum("kij,kj->ki", turned, out)
 
     def force_meeting(self, piece: Ints, w: Floats, direction: Floats, depth: Floats, arcs: EngagementArcs) -> Floats:
         """Cutting force (k, 3) N, program frame, of a tool with these engagement arcs (k places) that moves along `direction`."""
@@ -234,50 +237,6 @@ class Track:
         if self.path.orientation is not None:
             out[on] = np.einsum("kij,kj->ki", self.path.orientation.rotations(motion, u), out[on])
         return out
-
-
-def _force(
-    path: Path,
-    c: Conditions,
-    cutting: Bools,
-    motion: Ints,
-    s0: Floats,
-    *,
-    length: Floats,
-    load: PieceLoad | None,
-    piece: Ints,
-    w: Floats,
-    direction: Floats,
-    height: Callable[[Ints | slice], Floats],
-    driven: Floats | None = None,
-    turned: Floats | None = None,
-) -> Floats:
-    """Model force (k, 3) N for given feed directions, program frame.
-
-    height: z (mm) of the tips at some of the points, for a depth below the stock's top. turned (k, 3, 3):
-    rotation of the tool from the axis of the conditions. The model sees the feed in the frame of the tool.
-    """
-    out = np.zeros((len(piece), 3))
-    cuts = cutting[piece] & (sizes(direction) > 0.0)
-    if c.model is None or not cuts.any():
-        return out
-    on = slice(None) if cuts.all() else np.flatnonzero(cuts)
-    seen = direction if turned is None else np.einsum("kji,kj->ki", turned, direction)
-    if load is not None and not c.plunges:
-        found = load.base(piece[on], w[on])
-    else:
-        at, share = piece[on], w[on]
-        rows = motion[at]
-        depth, width = (np.full(len(rows), np.nan if each is None else each) for each in (c.depth_mm, c.width_mm))
-        if c.depth_mm is None and c.stock_top_mm is not None:
-            depth = c.stock_top_mm - height(on)
-        found = _components(
-            path=path, c=c, motion=rows, direction=seen[on], depth=depth, width=width,
-            s=s0[at] + share * length[at], ends=share == 1.0, arcs=None,
-            driven=None if driven is None else driven[on],
-        )  # fmt: skip
-    out[on] = to_vector(found, seen[on], c.tool_axis)
-    return out if turned is None else np.einsum("kij,kj->ki", turned, out)
 
 
 def _components(
@@ -397,18 +356,6 @@ def _in_tool_frame(path: Path, motion: Ints, u: Floats, direction: Floats) -> Fl
     return np.asarray(np.einsum("kji,kj->ki", path.orientation.rotations(motion, u), direction))
 
 
-def _end_force(track: Track, piece: Ints, w: Floats, direction: Floats) -> Floats:
-    """Model force (k, 3) N at the start (w 0) or the end (w 1) of pieces (k,), for feed directions (k, 3)."""
-    path, motion = track.path, track.motion[piece]
-    u = np.where(w == 0.0, track.u0[piece], track.u1[piece])
-    return _force(
-        path=path, c=track.conditions, cutting=track.cutting, motion=track.motion, s0=track.s0, length=track.length,
-        load=track.load, piece=piece, w=w, direction=direction,
-        height=lambda on: path_geometry.points(path, motion[on], u[on])[:, 2],
-        turned=None if path.orientation is None else path.orientation.rotations(motion, u),
-    )  # fmt: skip
-
-
 def _with_corners(track: Track, first: Floats, last: Floats, over: Bools) -> Track:
     """The track with corner loads, jumps and stops; first, last (p, 3): directions at the ends of its pieces.
 
@@ -423,9 +370,9 @@ def _with_corners(track: Track, first: Floats, last: Floats, over: Bools) -> Tra
     b = np.flatnonzero(smooth)
     a = before[b]
     ahead, fade0, fade1 = np.zeros((n, 3)), np.empty((n, 3)), np.empty((n, 3))
-    ahead[b] = _end_force(track, a, np.ones(len(a)), bisector.take(b, axis=0))
+    ahead[b] = track.force_along(a, np.ones(len(a)), bisector.take(b, axis=0))
     behind, other = ahead.copy(), b[_differ(track, a, b)]
-    behind[other] = _end_force(track, other, np.zeros(len(other)), bisector[other])
+    behind[other] = track.force_along(other, np.zeros(len(other)), bisector[other])
     share_loads(*pieces, before, smooth, own0, own1, ahead, behind, fade0, fade1, jump)
     return replace(track, own0=own0, own1=own1, even=even, fade0=fade0, fade1=fade1, jump=jump, corner=corner)
 
@@ -434,18 +381,18 @@ def _own_forces(track: Track, first: Floats, last: Floats) -> tuple[Floats, Floa
     """Model force (p, 3) N at both ends of pieces for directions (p, 3) there, and where it is linear between them."""
     c, n, path = track.conditions, len(track.motion), track.path
     every, straight = np.arange(n), path.kind[track.motion] != ARC
-    own0 = _end_force(track, every, np.zeros(n), first)
+    own0 = track.force_along(every, np.zeros(n), first)
     if path.orientation is not None or c.plunges:
-        return own0, _end_force(track, every, np.ones(n), last), ~track.cutting
+        return own0, track.force_along(every, np.ones(n), last), ~track.cutting
     if track.load is not None:  # linear between places of the engagement
-        return own0, _end_force(track, every, np.ones(n), last), straight | ~track.cutting
+        return own0, track.force_along(every, np.ones(n), last), straight | ~track.cutting
     level = c.depth_mm is not None or c.stock_top_mm is None
     if c.steady and level and straight.all():
         return own0, own0, straight
     even = straight & c.steady
     if not level:
         even &= path.start[track.motion, 2] == path.end[track.motion, 2]
-    return own0, _end_force(track, every, np.ones(n), last), even | ~track.cutting
+    return own0, track.force_along(every, np.ones(n), last), even | ~track.cutting
 
 
 def _differ(track: Track, a: Ints, b: Ints) -> Bools:
