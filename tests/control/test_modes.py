@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from camcomp.compensation.long.program import LongProgram
-from camcomp.compensation.program import control_account
+from camcomp.compensation.program import under_control
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.totals import Totals
 from camcomp.compensation.program.verify import verify
@@ -160,7 +160,7 @@ def test_where_the_control_goes_off_is_told_with_its_lines(orthoglide):
 
 @pytest.mark.parametrize("mode", ["G61", "G64", "G64 P0.01"])
 def test_long_programs_take_the_same_time_and_go_as_far_off(orthoglide, mode, monkeypatch):
-    monkeypatch.setattr(control_account, "STRETCH", 100)
+    monkeypatch.setattr(under_control, "STRETCH", 100)
     text = "\n".join([HEAD + mode, "S8000 M3", *raster(3000, 2000), "M2", ""]).encode()
     bulk = LongProgram(job=orthoglide, name="p.nc", setup=setup_of(orthoglide.config), tolerance_um=1.0, version="1")
     mine = bulk.run(io.BytesIO(text), len).summary()

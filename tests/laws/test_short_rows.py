@@ -11,7 +11,6 @@ from tests.commandline import ROOT
 EVERY_LINE = (
     "compensation/long/answers.py",
     "compensation/program/compensate.py",
-    "compensation/program/control_account.py",
     "compensation/program/corrected_rows.py",
     "compensation/program/judged_points.py",
     "compensation/program/moves.py",

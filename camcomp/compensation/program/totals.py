@@ -8,7 +8,6 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import BandTotals, band_figures
 from camcomp.compensation.program.compensate import Compensated
-from camcomp.compensation.program.control_account import ControlAccount
 from camcomp.compensation.program.result import (
     ErrorSum,
     Interpolation,
@@ -17,7 +16,7 @@ from camcomp.compensation.program.result import (
     job_figures,
     worse_than_before,
 )
-from camcomp.compensation.program.under_control import control_figures, control_warnings, merging
+from camcomp.compensation.program.under_control import ControlAccount, control_figures, control_warnings, merging
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode

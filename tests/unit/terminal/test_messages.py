@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from camcomp.api import diagnosis
-from camcomp.compensation.program.control_account import FarOff
-from camcomp.compensation.program.under_control import control_warnings
+from camcomp.compensation.program.under_control import FarOff, control_warnings
 from camcomp.compensation.report.page import _caution
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.files import shipped
