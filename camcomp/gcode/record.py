@@ -183,7 +183,8 @@ class Recorder:
     def linear_motions(self, row: int, found: LinearMotions, state: ControlState) -> None:
         """Motions of linear moves, the first of which is line `row`; state: that in front of them."""
         n = len(found.row)
-        numbers = np.zeros((NUMBERS, n))
+        numbers = np.empty((NUMBERS, n))
+        numbers[12] = numbers[25] = 0.0
         numbers[0], numbers[1], numbers[2] = row + found.row, found.kind, found.kind != RAPID
         numbers[3:6], numbers[6:9], numbers[9:12] = found.start.T, found.end.T, math.nan
         numbers[13] = np.where(found.kind == RAPID, math.nan, found.feed)
@@ -271,7 +272,7 @@ class Recorder:
             plane=frozen(plane, np.int8),
             feed_mode=frozen(a[21], np.int8),
             modal_feed=frozen(a[23]),
-            moved=frozen((flags[:, None] >> np.array([8, 9, 10])) & 1, np.bool_),
+            moved=frozen(np.stack([(flags & 1 << bit) > 0 for bit in (8, 9, 10)], axis=1), np.bool_),
             code_stated=frozen((flags & 16) > 0, np.bool_),
             feed_stated=frozen((flags & 32) > 0, np.bool_),
             modes_changed=frozen((flags & 64) > 0, np.bool_),

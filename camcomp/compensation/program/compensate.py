@@ -213,12 +213,14 @@ class _Correction:
             piece, w = np.concatenate((piece, between))[order], np.concatenate((w, at))[order]
         result, turned = asked.aim(piece, w, method=self.method, tips_only=True)
         words = asked.words(nodes.piece, nodes.w)
-        words[on] = turned[points]
+        if asked.orienting is not None:
+            words[on] = turned[points]
         status = result.status
         if self.part is not None:  # the others are refused as parts of their own
             own = (track.motion[piece] >= self.part.first) & (track.motion[piece] < self.part.last)
             status = np.where(own, status, 0)
-        refuse_unsolved(self.program, track, piece, track.points(piece, w), status)
+        if status.any():
+            refuse_unsolved(self.program, track, piece, track.points(piece, w), status)
         aimed = out = result.commanded.take(points, axis=0)
         if len(on) < len(nodes.w):
             out = track.points(nodes.piece, nodes.w)

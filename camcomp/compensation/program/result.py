@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.result import Result, Size
-from camcomp.ground.vectors import sizes
+from camcomp.ground.vectors import chosen, sizes
 from camcomp.model.cutting.assumed import Engagement, assumed_force
 from camcomp.model.job import Job
 
@@ -42,7 +42,7 @@ class ErrorSum:
     def add(self, error: Floats) -> None:
         """Add errors (k, 3) mm; NaN rows are ignored."""
         size = 1e3 * sizes(error)
-        size = size[np.isfinite(size)]
+        size = chosen(size, np.isfinite(size))
         self._squares, self._count = self._squares + float(np.sum(size**2)), self._count + len(size)
         self.most_um = max(self.most_um, float(size.max(initial=0.0)))
 
