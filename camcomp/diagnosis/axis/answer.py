@@ -89,10 +89,7 @@ def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
     share = shares({a.name: c.squares[0] for a in found if (c := a.following or a.force) is not None})
     drivers: list[Driver] = []
     for a in found:
-        if a.ripple and a.revolute:
-            drivers.append(Driver(covariate=f"position:{a.name}", share=round(a.ripple.share, 4)))
-        elif a.ripple:
-            line = a.ripple
+        if (line := a.ripple) is not None:
             drivers.append(
                 RippleDriver(
                     covariate=f"position:{a.name}",
