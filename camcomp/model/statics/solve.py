@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from camcomp.model.statics import point, rigid, sweep
 from camcomp.model.statics.layout import SPRINGS, new_memory, new_work
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.rotation import rotation_vectors
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 Array = NDArray[np.float64]
 PIECE = 256
@@ -104,10 +108,19 @@ def in_pieces(work: Callable[[slice], None], n: int, most: int = PIECE) -> None:
         for piece in points(pieces, len(pieces)):
             work(piece)
         return
+    list(points(_pool(threads()).map(work, pieces), len(pieces)))
+
+
+@cache
+def _pool(workers: int) -> Executor:
+    """Threads that stay until the process ends: loops with memory ask thousands of times for a few thousand points."""
     from concurrent.futures import ThreadPoolExecutor  # slow import, for several threads only
 
-    with ThreadPoolExecutor(workers) as pool:
-        list(points(pool.map(work, pieces), len(pieces)))
+    return ThreadPoolExecutor(workers)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)  # threads stay with the parent
 
 
 def solve(
