@@ -92,7 +92,11 @@ def test_a_bump_of_a_guide_is_no_wave_with_a_pitch(tmp_path):
     [
         pytest.param(1744002, id="one arm", marks=pytest.mark.campaign),
         pytest.param(1744005, id="another arm"),
-        pytest.param(1744007, id="a third arm", marks=pytest.mark.campaign),
+        pytest.param(
+            1744007,
+            id="a third arm",
+            marks=(pytest.mark.campaign, pytest.mark.xfail(strict=True, reason="A2 has 0.23")),
+        ),
     ],
 )
 def test_springs_some_per_cent_off_are_found_though_a_length_or_a_soft_tool_does_for_two_of_them(tmp_path, seed):
