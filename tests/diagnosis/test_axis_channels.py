@@ -116,6 +116,24 @@ def test_a_second_encoder_behind_the_gear_shows_its_play(tmp_path):
     assert result.axes_in_detail["J1"]["second_encoder"]["delay_ms"].value == pytest.approx(2.0, abs=0.1)
 
 
+def soft_gear_log(folder, name, seed):
+    """A gear of 10 N m/mrad between a motor that rubs and a link; the motor's torque also accelerates its rotor."""
+    t, q, speed, acceleration = course(seed)
+    through = INERTIA * acceleration + WEIGHT * np.cos(q)
+    noise = np.random.default_rng(seed + 1).normal(0, 1.0, (3, len(t)))
+    torque = through + INERTIA * acceleration + FORCE * np.tanh(speed / 0.005) + 20.0 * noise[2]
+    load = q - 1e-7 * through + 1.5e-6 * noise[0]
+    write(folder, name, {"t_s": t, "act_J1_rad": q + 1.5e-6 * noise[1], "load_J1_rad": load, "act_J1_Nmm": torque})
+
+
+def test_a_soft_gear_bends_under_the_inertia_of_masses_that_nobody_states(tmp_path):
+    (tmp_path / "arm.yaml").write_text(ARM.replace(", stiffness_Nmm_per_rad: 1.0e+9", ""))
+    for name, seed in (("a", 1), ("b", 5)):
+        soft_gear_log(tmp_path, name, seed)
+    result = asked(tmp_path, ["arm.yaml"], "ab", holdout=["b"])
+    assert result.verdict == "identified" and [c.effect for c in result.causes] == ["friction"]
+
+
 def test_play_that_the_machine_file_has_is_not_found_again(tmp_path):
     (tmp_path / "arm.yaml").write_text(ARM)
     play = {"effects": [{"effect": "backlash", "target": "J1", "width_rad": 1.5e-4}]}

@@ -207,6 +207,7 @@ def _healthy(
         if rows.channel == "behind":
             own |= {"eccentricity": weight} if hinge else {}
             own["delay"] = m.speed[:, None]
+            own |= {} if axes[k].inertia.any() else {"inertia": m.acceleration[:, None]}  # of masses that nobody states
             own |= {"compliance": forces[k][:, None]} if all(np.isfinite(each).all() for each in forces) else {}
         else:
             own[ACCELERATION] = m.acceleration[:, None]
