@@ -21,15 +21,20 @@ STEADY = 0.1  # of a speed, by which it changes at most over the rows of a fourt
 def rows_floor(channels: Sequence[Floats]) -> float:
     """Deviation of one row, from fourth differences of every run's channel (n,); never less than its resolution says.
 
-    By the median, so that steps at reversals and rows far out do not count; of the fourth order, so that motion does not.
+    By the median, so that steps at reversals and rows far out do not count; of the fourth order, so that motion does not. By
+    the mean where the resolution is coarser.
     """
     noise = []
     for y in channels:
         steps = np.abs(np.diff(y))
         quantum = float(np.min(steps[steps > 1e-9 * max(float(np.ptp(y)), 1e-300)], initial=np.inf))
         often = np.mean(steps < 0.5 * quantum) > STAYING  # rows that stay on a value: it is a resolution
-        scatter = float(median_abs_deviation(np.diff(y, 4), scale="normal")) / np.sqrt(70.0) if len(y) > 5 else 0.0
-        noise.append(max(scatter, quantum / np.sqrt(12.0) if often and np.isfinite(quantum) else 0.0))
+        fourth = np.diff(y, 4) / np.sqrt(70.0) if len(y) > 5 else np.zeros(1)
+        scatter = float(median_abs_deviation(fourth, scale="normal"))
+        if often and np.isfinite(quantum):  # rows that stay on a value and seldom leave it have a median of nothing
+            flicker = float(np.sqrt(np.mean(np.clip(fourth, -quantum, quantum) ** 2)))
+            scatter = max(scatter, quantum / np.sqrt(12.0), flicker if scatter < quantum else 0.0)
+        noise.append(scatter)
     return float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0
 
 

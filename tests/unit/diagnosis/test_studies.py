@@ -270,6 +270,12 @@ def test_the_resolution_of_an_encoder_is_noise():
     assert rows_floor([slow]) == pytest.approx(0.002 / np.sqrt(12.0))
 
 
+def test_a_standing_axis_that_seldom_leaves_a_coarse_count_has_the_noise_of_its_readings():
+    read = 0.008 * np.round(np.random.default_rng(1).normal(0.0, 0.0025, 20000) / 0.008)
+    assert np.mean(read == 0.0) > 0.8
+    assert rows_floor([read]) == pytest.approx(np.std(read), rel=0.04)
+
+
 @pytest.mark.campaign
 def test_what_a_coarse_encoder_does_by_way_of_speed_and_acceleration_is_noise_too():
     log = axis_log(step=1e-3)
