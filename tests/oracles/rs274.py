@@ -83,19 +83,17 @@ def run(
         lengths = "".join(f"T{n} P{n} Z{z / 25.4:.9f} D0\n" for n, z in (tools or {}).items())
         (root / "tool.tbl").write_text(table or lengths or "T99 P99 Z0 D0\n")
         command = [str(binary()), "-g", "-v", "rs274.var", "-t", "tool.tbl", "program.ngc"]
-        for _ in range(3):
-            done = subprocess.run(
-                command,
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=120,
-                check=False,
-            )
-            if done.returncode >= 0:
-                break  # on a busy machine a signal ends it now and then, whatever the program
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            env={**os.environ, "HOME": folder},  # where its tools lie, which two at once would share
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=120,
+            check=False,
+        )
     result = _parse(done.stdout, done.stderr)
     result.error = result.error and f"{result.error} (exit {done.returncode})"
     return result
