@@ -155,7 +155,8 @@ class Totals:
         rows, state, first = result.rows, result.state, own.start or 0
         s0, t0 = (result.s[first - 1], result.t[first - 1]) if first else (0.0, 0.0)
         s, t = self._s + result.s[own] - s0, self._t + result.t[own] - t0
-        self._s, self._t = float(s[-1]), float(t[-1])
+        if len(s):
+            self._s, self._t = float(s[-1]), float(t[-1])
         return JointTableRows(
             line=result.lines[own], s=s, t=t, target=rows.target[own], written=result.written.end[own],
             force=result.force[own], nominal=result.nominal[own], joints=state.rho[own], drive=state.drive[own],

@@ -289,7 +289,7 @@ def stays_apart(program: Program, rows: CorrectedRows, part: Part | None) -> Boo
     cut = np.zeros(len(begins), np.bool_)
     cut[rows.motion[moved_cuts(rows)]] = True
     section = np.cumsum(begins)
-    first = np.full(int(section[-1]) + 1, len(begins))
+    first = np.full(int(section.max(initial=0)) + 1, len(begins))
     at = np.flatnonzero(cut & able)
     np.minimum.at(first, section[at], at)
     out: Bools = (able & (np.arange(len(begins)) >= first[section]))[rows.motion]

@@ -58,7 +58,8 @@ class JointTable:
 
     def add(self, rows: JointTableRows) -> None:
         """Adds rows."""
-        actuators = np.stack((rows.nominal, rows.joints, rows.drive), axis=2).reshape(len(rows.line), -1)
+        n, m = rows.joints.shape
+        actuators = np.stack((rows.nominal, rows.joints, rows.drive), axis=2).reshape(n, 3 * m)
         behind = [] if rows.behind is None else [rows.behind]
         self._rows(
             rows.line, np.column_stack((rows.s, rows.t, rows.target, rows.written, rows.force, actuators, *behind))
