@@ -8,10 +8,13 @@ import json
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.axis.effect_columns import DrivenAxis
+from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.ground import shelf
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Motion
 from camcomp.model.law.law import EmpiricalLaw
+from camcomp.model.statics.description import Actuator
 from tests.validation import runner
 
 KP, KV, INERTIA = 20.0, 60.0, 1.5  # 1/s, N m s/rad, kg m2
@@ -86,3 +89,14 @@ def test_a_push_on_a_loop_is_followed_as_late_as_its_set_points():
     time, late = encoders(("servo_lag", "formula"))
     assert late == pytest.approx(np.where(time > 0.1, 1.0 - np.exp(-(time - 0.1) / 0.05), 0.0), abs=0.02)
     assert encoders(("formula",))[1] == pytest.approx((time > 0.1).astype(float))
+
+
+def test_a_lag_that_the_machine_file_has_delays_pushes_as_one_that_is_found_does():
+    time = np.arange(0.0, 2.0, 0.001)
+    rest = np.zeros(len(time))
+    stated = Cause("servo_lag", shelf.load("effects", "servo_lag"), "x", {"time_constant_ms": 50.0})
+    run = AxisRun(name="a", time=time, setpoint=rest, encoder=rest, force=rest, stated=(stated,))
+    slide = Actuator("x", revolute=False, axis=np.array([1.0, 0.0, 0.0]), stiffness=None)
+    axis = DrivenAxis(run=run, actuator=slide, lever=1.0, weight=rest, inertia=rest)
+    late = axis.deflected(time, (time > 1.0)[:, None].astype(float), ())[:, 0]
+    assert late == pytest.approx(np.where(time > 1.0, 1.0 - np.exp(-(time - 1.0) / 0.05), 0.0), abs=0.03)

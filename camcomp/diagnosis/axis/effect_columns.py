@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from typing import Any, Literal
 
@@ -151,10 +151,10 @@ class DrivenAxis:
         """Encoders (n, 1) by the machine file."""
         return self.followed(())
 
-    def followed(self, causes: Sequence[Cause], asked: Motion | None = None) -> Floats:
-        """Encoders (n, 1) behind causes of the control, on top of those that the machine file states; asked: other set-points."""
+    def followed(self, causes: Sequence[Cause]) -> Floats:
+        """Encoders (n, 1) behind causes of the control, on top of those that the machine file states."""
         every = signal_path.on_top(causes, self.run.stated)
-        return signal_path.controlled(every, (self.actuator.name,), asked or self.asked)
+        return signal_path.controlled(every, (self.actuator.name,), self.asked)
 
     def known(self, causes: Sequence[Cause]) -> Bools:
         """Rows (n,) in which causes of the control do not depend on how the axis moved before its log began."""
@@ -172,13 +172,14 @@ class DrivenAxis:
 
     def deflected(self, time: Floats, columns: Floats, causes: Sequence[Cause]) -> Floats:
         """Columns (n, q) at instants (n,) that deflect the loop, as it follows them."""
-        loops = [cause for cause in causes if not cause.uncorrectable]
-        if not loops:
+        loops = [cause for cause in signal_path.on_top(causes, self.run.stated) if not cause.uncorrectable]
+        if not signal_path.acting(loops, "control"):
             return columns
-        out = []
+        followed, out = partial(signal_path.controlled, loops, (self.actuator.name,)), []
+        alone = followed(self.asked)
         for each in columns.T:
             pushed = replace(self.asked, encoder=self.asked.encoder + np.interp(self.asked.time, time, each)[:, None])
-            out.append(np.interp(time, self.asked.time, (self.followed(loops, pushed) - self.followed(loops))[:, 0]))
+            out.append(np.interp(time, self.asked.time, (followed(pushed) - alone)[:, 0]))
         return np.stack(out, axis=1)
 
     def _compliance(self, cause: Cause | None) -> float:
