@@ -96,7 +96,7 @@ def test_a_lag_that_the_machine_file_has_delays_pushes_as_one_that_is_found_does
     rest = np.zeros(len(time))
     stated = Cause("servo_lag", shelf.load("effects", "servo_lag"), "x", {"time_constant_ms": 50.0})
     run = AxisRun(name="a", time=time, setpoint=rest, encoder=rest, force=rest, stated=(stated,))
-    slide = Actuator("x", revolute=False, axis=np.array([1.0, 0.0, 0.0]), stiffness=None)
+    slide = Actuator(name="x", revolute=False, axis=np.array([1.0, 0.0, 0.0]), stiffness=None)
     axis = DrivenAxis(run=run, actuator=slide, lever=1.0, weight=rest, inertia=rest)
     late = axis.deflected(time, (time > 1.0)[:, None].astype(float), ())[:, 0]
     assert late == pytest.approx(np.where(time > 1.0, 1.0 - np.exp(-(time - 1.0) / 0.05), 0.0), abs=0.03)
