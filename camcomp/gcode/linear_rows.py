@@ -21,48 +21,52 @@ FEED_SLACK = 1.0e-3
 MAX_ROW_BYTES = 128  # bytes that a row needs at most, beside its line
 CELL_BYTES = 32  # bytes that a cell needs at most
 _LARGEST_NUMBER = 9.0e9  # a larger number with nine decimals does not fit into 64 bits
-_TENS = 10 ** np.arange(18)
+_TENS = 10 ** np.arange(19, dtype=np.uint64)  # unsigned: their quotients need no rounding of negative ones
+_TEN, _NOUGHT = np.uint64(10), np.uint64(48)  # and the character 0
+_POWERS = _TENS.astype(float)
 
 
 @inner
 def put_decimal(out, at, value, digits, point):
     """Writes `value` rounded to `digits` decimals as numbers.linear does; the index behind it."""
-    scaled = np.rint(value * _TENS[digits])
-    negative = scaled < 0.0
-    whole = np.int64(abs(scaled))
-    if negative:
+    scaled = np.rint(value * _POWERS[digits])
+    if scaled < 0.0:
         out[at] = 45
         at += 1
-    head = whole // _TENS[digits]
-    tail = whole - head * _TENS[digits]
-    at = put_int(out, at, head)
-    while digits > 0 and tail % 10 == 0:
-        tail //= 10
+    whole = np.uint64(abs(scaled))
+    while digits > 0 and whole % _TEN == 0:
+        whole //= _TEN
         digits -= 1
-    if digits > 0 or point:
+    at = put_number(out, at, whole, digits)
+    if point and digits == 0:
         out[at] = 46
-        at += 1
-    if digits > 0:
-        for k in range(digits - 1, -1, -1):  # from behind: to divide by ten, which is known, is quick
-            out[at + k] = 48 + tail % 10
-            tail //= 10
-        at += digits
-    elif point:
-        out[at] = 48
-        at += 1
+        out[at + 1] = 48
+        at += 2
     return at
 
 
 @inner
-def put_int(out, at, value):
-    """Writes a whole number that is not negative; the index behind it."""
-    n = 1
-    while n < 18 and value >= _TENS[n]:
+def put_number(out, at, whole, digits):
+    """Writes a whole number with a point in front of its last digits, if there are any; the index behind it."""
+    n = digits + 1
+    while n < 19 and whole >= _TENS[n]:
         n += 1
-    for k in range(n - 1, -1, -1):
-        out[at + k] = 48 + value % 10
-        value //= 10
-    return at + n
+    point = at + n - digits
+    if digits > 0:
+        whole = put_digits(out, point + 1, point + 1 + digits, whole)
+        out[point] = 46
+    put_digits(out, at, point, whole)
+    return point + digits + (1 if digits > 0 else 0)
+
+
+@inner
+def put_digits(out, begin, end, whole):
+    """Fills out[begin:end] with the last digits of a whole number; the number in front of them."""
+    for k in range(end - 1, begin - 1, -1):
+        rest = whole // _TEN
+        out[k] = _NOUGHT + (whole - rest * _TEN)
+        whole = rest
+    return whole
 
 
 @inner
@@ -155,7 +159,7 @@ def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed,
                 fresh[k] = abs(stays - target[k]) > half
                 goes[k] = stays
                 if fresh[k]:
-                    value[k] = np.rint((target[k] - offset[k]) / unit * _TENS[digits]) / _TENS[digits]
+                    value[k] = np.rint((target[k] - offset[k]) / unit * _POWERS[digits]) / _POWERS[digits]
                     goes[k] = value[k] * unit + offset[k]
                     fresh[k] = goes[k] != stays
             want = program_feed[i] if np.isnan(feed[row]) else feed[row]
@@ -166,7 +170,7 @@ def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed,
             if new:
                 if not (fresh[0] or fresh[1] or fresh[2]):
                     fresh[0] = True
-                    value[0] = np.rint((position[0] - offset[0]) / unit * _TENS[digits]) / _TENS[digits]
+                    value[0] = np.rint((position[0] - offset[0]) / unit * _POWERS[digits]) / _POWERS[digits]
                     goes[0] = value[0] * unit + offset[0]
                 word = False
                 if state[0] != code:
@@ -268,27 +272,18 @@ def put_rows(line, values, decimals, out):
     """Fills out with the text; the number of bytes."""
     at = 0
     for i in range(line.shape[0]):
-        at = put_int(out, at, line[i])
+        at = put_number(out, at, np.uint64(line[i]), 0)
         for k in range(values.shape[1]):
             out[at] = 44
             at += 1
             value = values[i, k]
             if not abs(value) < _LARGEST_NUMBER:
                 continue
-            digits = decimals[k]
-            scaled = np.rint(abs(value) * _TENS[digits])
-            whole = np.int64(scaled)
+            whole = np.uint64(np.rint(abs(value) * _POWERS[decimals[k]]))
             if whole > 0 and value < 0.0:
                 out[at] = 45
                 at += 1
-            head = whole // _TENS[digits]
-            tail = whole - head * _TENS[digits]
-            at = put_int(out, at, head)
-            out[at] = 46
-            for j in range(digits):
-                out[at + digits - j] = 48 + tail % 10
-                tail //= 10
-            at += digits + 1
+            at = put_number(out, at, whole, decimals[k])
         out[at] = 10
         at += 1
     return at

@@ -20,6 +20,7 @@ from camcomp.model.job import Job
 from camcomp.model.statics.target import settle
 
 PARQUET = ".parquet"
+AT_ONCE = 1 << 12  # rows of CSV, whose text then fits into the cache
 DECIMALS = 6
 DECIMALS_RAD = 9  # 2 m of reach make 2 nm of it
 ORIENTATION = ["a_deg", "b_deg", "c_deg", "ac_deg", "bc_deg", "cc_deg"]  # programmed, corrected
@@ -76,7 +77,9 @@ class CsvFile:
 
     def rows(self, line: Ints, values: Floats) -> None:
         """Adds rows."""
-        self._file.write(csv_rows(line, values, self._decimals))
+        for begin in range(0, len(line), AT_ONCE):
+            some = slice(begin, begin + AT_ONCE)
+            self._file.write(csv_rows(line[some], values[some], self._decimals))
 
     def close(self) -> None:
         """Writes the end of the file."""
