@@ -17,8 +17,11 @@ def distinct(values: np.ndarray) -> list[Any]:
 
 
 def chosen(values: NDArray[Kind], on: Bools) -> NDArray[Kind]:
-    """Rows of values (n, ...) that are on (n,): the array itself where all are."""
-    return values if on.all() else values.compress(on, axis=0)
+    """Rows of values (n, ...) that are on (n,): a view where they follow each other, the array itself where all are on."""
+    if on.all():
+        return values
+    first, last = int(on.argmax()), len(on) - int(on[::-1].argmax())
+    return values[first:last] if on[first:last].all() else values.compress(on, axis=0)
 
 
 def sizes(vectors: Floats) -> Floats:

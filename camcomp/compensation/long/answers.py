@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -235,10 +236,10 @@ def compensate_whole(program: Program, job: Job, *, method: str, **settings: Any
 
 def with_answers(job: Job) -> Job:
     """The job with a machine that answers by interpolation."""
-    other = replace(job)
     machine = job.real_machine
+    other = copy(job)  # with what it has built so far
+    vars(other).pop("correctable", None)  # whose machine answers exactly
     vars(other)["real_machine"] = replace(machine, answers=InterpolatedMachine(machine, job.frame.origin))
-    vars(other)["causes"] = job.causes
     return other
 
 

@@ -79,7 +79,6 @@ class LongProgram:
         self._feeds = UncorrectedFeeds(self.name)
         if self.job.conditions.model is not None and not self.job.conditions.steady:
             raise NotInPieces
-        self._interpolated = with_answers(self.job)
         self._minutes = 0.0  # of the pieces so far
         self._random = np.random.default_rng(
             int(digest.hexdigest()[:16], 16)
@@ -91,6 +90,7 @@ class LongProgram:
         self._stock = _stock_of(self.job, source, self.name, self.setup)
         self._runs = Runs(source=source, name=self.name, setup=self.setup, dialect=self.job.config.control.dialect)
         self._stamp: str | None = stamp_text(digest.hexdigest(), self.version, self.job.fingerprint)
+        self._interpolated = with_answers(self.job)
         with ThreadPoolExecutor(1) as self._beside:
             for data in self._pieces():
                 self.totals.lines_out += _count_of(b"\n", data)

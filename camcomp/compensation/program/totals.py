@@ -112,7 +112,7 @@ class Totals:
         self.joins += int(result.rows.joining[own].sum())
         self.change = np.fmax(self.change, _largest(out.joints - out.nominal, corrected))
         self.force = np.fmax(self.force, _largest(out.drive, corrected))
-        self.tilt = float(np.fmax.reduce(sizes(state.tilt[own])[corrected], initial=self.tilt))
+        self.tilt = float(np.fmax.reduce(chosen(sizes(state.tilt[own]), corrected), initial=self.tilt))
         for total, error in ((self.before, result.before), (self.after, result.after), (self.missed, result.missed)):
             total.add(error)
         self._add_beyond(out)

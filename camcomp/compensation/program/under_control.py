@@ -194,10 +194,13 @@ class UnderControl:
         self.programmed, self.limits = programmed_moves(program, job), limits_of(job.config)
         self.rest, self.apart, self.tolerance_mm = rest, apart is not None, 1e-3 * tolerance_um
         self.modes = modes_of(program)  # of the cuts, in the order in which they come
-        own = self.programmed.take(rows.motion)
-        self.written = replace(
-            own, **vars(rows.curves(program.path, written.end, written.centre)), feed=job.conditions.feeds(written.feed),
-            exact=own.exact | rest, waits=_waits(program, rows), merge=own.merge if apart is None else np.where(apart, 0.0, own.merge),
+        own, motion = self.programmed, rows.motion
+        merge = own.merge.take(motion)
+        self.written = ToolMoves(
+            **vars(rows.curves(program.path, written.end, written.centre)), feed=job.conditions.feeds(written.feed),
+            exact=own.exact.take(motion) | rest, waits=_waits(program, rows), stop=own.stop.take(motion),
+            tolerance=own.tolerance.take(motion), merge=merge if apart is None else np.where(apart, 0.0, merge),
+            per_turn=own.per_turn.take(motion),
         )  # fmt: skip
         judged = points.judged
         row = chosen(points.row, judged)
