@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion, Parameter
-from camcomp.model.hysteresis import rate_limited
+from camcomp.model.hysteresis import first_order, rate_limited
 
 STAGE = "control"
 TARGET = "actuator"
@@ -59,7 +59,7 @@ def first_guess(runs: Sequence[tuple[Floats, Floats, Floats]]) -> float:
 
 
 def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[str, float]:
-    """Largest speed and dead time of logs of one axis by least squares; empty where a dead time alone explains as much.
+    """Largest speed and dead time of logs of one axis by least squares; empty where a dead time or a lag alone explains as much.
 
     runs: as in `first_guess`; encoders NaN at instants between rows.
     """
@@ -73,7 +73,9 @@ def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[st
     )
     at = minimize(lambda x: _left(runs, *np.abs(x)), first, method="Nelder-Mead", options={"maxiter": 60}).x
     speed, dead = (abs(float(each)) for each in at)
-    if min(_left(runs, NO_LIMIT, each) for each in (*_DEAD_TIMES_S, dead)) <= _left(runs, speed, dead):
+    others = [_left(runs, NO_LIMIT, each) for each in (*_DEAD_TIMES_S, dead)]
+    others += [_left_by_lag(runs, each) for each in (*_DEAD_TIMES_S[1:], max(dead, 1e-6))]
+    if min(others) <= _left(runs, speed, dead):
         return {}
     return {"speed_rad_per_s" if hinge else "speed_mm_per_s": speed, "dead_time_ms": 1e3 * dead}
 
@@ -89,6 +91,11 @@ def _left(runs: Sequence[tuple[Floats, Floats, Floats]], speed: float, dead: flo
     return sum(
         float(np.nansum((y - rate_limited(_delayed(x[:, None], t, dead), t, speed)[:, 0]) ** 2)) for t, x, y in runs
     )
+
+
+def _left_by_lag(runs: Sequence[tuple[Floats, Floats, Floats]], constant: float) -> float:
+    """Sum of squares that a first-order lag leaves of the encoders."""
+    return sum(float(np.nansum((y - first_order(x[:, None], t, constant)[:, 0]) ** 2)) for t, x, y in runs)
 
 
 def on_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:

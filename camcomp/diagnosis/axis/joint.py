@@ -41,9 +41,11 @@ from camcomp.diagnosis.result.types import LawPart
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import PRESLIDING_MM
+from camcomp.model.law.expression import washout
 
 TURNS_MM = (1e-4, 0.003, 0.02, 0.1)  # ways over which the friction of a slide turns round in its following error
 DEFLECTS = ("friction", "weight", "asymmetry")  # kinds that act on a loop
+INTEGRAL_S = (0.02, 0.06, 0.2)  # in which an integrator of the loop may take over what deflects it
 CORNERS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0)  # times the speed at which a hinge's friction turns round: of a polygon
 # of the fastest row: speeds at which the friction of a hinge turns round in its following error
 CREEP = (0.005, 0.01, 0.02, 0.05)
@@ -124,11 +126,27 @@ def _find_ripple(found: AxisFindings, channel: AxisChannel) -> None:
     found.unknown_chance = min(found.unknown_chance, float(-odds / np.log(10.0)))
 
 
+def _taken_over(friction: Floats, move: AxisTravel) -> Floats:
+    """Columns of friction, and what the integrator of a loop leaves of it.
+
+    A PI controller of the speed makes s / (s + 1 / T) of a force (Gross, Hamann, Wiegaertner: Electrical feed drives in
+    automation); whether there is one, and its T, the rows tell.
+    """
+    return np.hstack([friction, *(washout(move.time, friction[:, ::2], T) for T in INTEGRAL_S)])
+
+
 def _following_laws(rows: ChannelData) -> dict[str, tuple[str, ...]]:
     """Formulas of the sizes that every axis has in its following error, by kind, over its motion behind effects of the control.
 
     The speed is that of a lag too small or too unsure to be a cause.
     """
+    laws = _pushes(rows)
+    taken_over = [f"washout({each}, {T:g})" for T in INTEGRAL_S for each in laws["friction"][::2]]
+    return laws | {"friction": (*laws["friction"], *taken_over)}
+
+
+def _pushes(rows: ChannelData) -> dict[str, tuple[str, ...]]:
+    """Formulas by kind where the loop has no integrator."""
     hinge = rows.hinge
     place = "followed_rad" if hinge else "followed_mm"
     out = {"acceleration": (f"{place}_per_s2",), "speed": (f"{place}_per_s",), "offset": ("1",)}
@@ -212,9 +230,9 @@ def _healthy(
         else:
             own[ACCELERATION] = m.acceleration[:, None]
         if rows.channel == "following" and hinge:
-            own |= {"friction": np.tanh(m.speed[:, None] / _creep(rows)), "weight": weight}
+            own |= {"friction": _taken_over(np.tanh(m.speed[:, None] / _creep(rows)), m), "weight": weight}
         elif rows.channel == "following":
-            own["friction"] = np.stack([m.reversal(way) for way in TURNS_MM], axis=1)
+            own["friction"] = _taken_over(np.stack([m.reversal(way) for way in TURNS_MM], axis=1), m)
         if rows.asymmetric:
             own["asymmetry"] = np.abs(m.speed)[:, None]
         if rows.between:

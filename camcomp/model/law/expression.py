@@ -19,7 +19,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.records import dataclass
-from camcomp.model.hysteresis import direction, play
+from camcomp.model.hysteresis import direction, first_order, play
 
 LONGEST = 4000  # characters
 DEEPEST = 60  # nested brackets and signs
@@ -57,6 +57,12 @@ def since(u: Floats) -> Floats:
     return np.asarray(gone - np.maximum.accumulate(last))
 
 
+def washout(time: Floats, u: Floats, constant: float) -> Floats:
+    """What is left of u (n,) or (n, q) at times (n,) s, each change of which fades with a time constant, s; 0 at the start."""
+    u = np.broadcast_to(u, (len(time), *u.shape[1:]))
+    return np.asarray(u - first_order(u.reshape(len(time), -1), time, max(constant, 1e-9)).reshape(u.shape))
+
+
 # name -> (number of arguments, function, description)
 FUNCTIONS: dict[str, tuple[int, Callable[..., Floats], str]] = {
     "sin": (1, np.sin, "sine of rad"),
@@ -74,9 +80,11 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Floats], str]] = {
     "way": (2, way, "sense of travel, -1 to 1, that a reversal turns round over a length"),
     "drag": (2, drag, "what a play of a full width takes away"),
     "since": (1, since, "way since the last reversal"),
+    "washout": (2, washout, "what is left of a value whose changes fade with a time constant in s"),
 }
-_LENGTHS = {"way", "drag"}  # their second argument is one number
-_OF_ROWS_IN_ORDER = {*_LENGTHS, "since"}
+_BY_TIME = {"washout"}  # of a run
+_BY_NUMBER = {"way", "drag", *_BY_TIME}  # their second argument is one number
+_OF_ROWS_IN_ORDER = {*_BY_NUMBER, "since"}
 
 
 @dataclass(frozen=True)
@@ -226,7 +234,7 @@ class _Reader:
         self.expect(")")
         if len(parts) != FUNCTIONS[name][0]:
             raise FormulaError(f"{name} takes {FUNCTIONS[name][0]} argument(s), not {len(parts)}", at)
-        if name in _LENGTHS and any(each.kind == "name" for each in parts[1].walk()):
+        if name in _BY_NUMBER and any(each.kind == "name" for each in parts[1].walk()):
             raise FormulaError(f"the second argument of {name} is one number", parts[1].at)
         return FormulaNode("call", name, tuple(parts), at)
 
@@ -241,7 +249,8 @@ def _value(node: FormulaNode, rows: Mapping[str, Floats]) -> Floats:
         name = str(node.value)
         if name in _OF_ROWS_IN_ORDER:
             first = np.atleast_1d(np.asarray(parts[0], float))
-            return FUNCTIONS[name][1](first, *(float(each) for each in parts[1:]))
+            more = [float(each) for each in parts[1:]]
+            return FUNCTIONS[name][1](*(rows["t_s"],) if name in _BY_TIME else (), first, *more)
         return np.asarray(FUNCTIONS[name][1](*parts))
     if node.kind == "neg":
         return np.asarray(-parts[0])

@@ -43,6 +43,13 @@ def test_what_remembers_goes_along_the_rows():
     assert value("drag(x_mm, 0.5)", x_mm=there_and_back) == pytest.approx([0, -0.25, -0.25, 0.25, 0.25])
 
 
+def test_a_washout_of_a_ramp_is_the_step_response_of_a_lag():
+    t = np.array([0.0, 0.1, 0.25, 0.3, 1.0])
+    ramp = 0.2 * (1.0 - np.exp(-t / 0.2))  # s / (s + 1 / T) of t: T (1 - exp(-t / T))
+    assert value("washout(x_mm, 0.2)", x_mm=t, t_s=t) == pytest.approx(ramp)
+    assert value("washout(7, 0.2)", x_mm=t, t_s=t) == pytest.approx(np.zeros(5))
+
+
 @pytest.mark.parametrize(
     ("text", "at"),
     [
@@ -58,6 +65,7 @@ def test_what_remembers_goes_along_the_rows():
         ("1 + $", 4),
         ("x_mm**2", 5),
         ("way(x_mm, t_s)", 10),
+        ("washout(x_mm, t_s)", 14),
         ("(" * 80 + "1" + ")" * 80, 31),
         ("1" + "+1" * 3000, 4000),
     ],
