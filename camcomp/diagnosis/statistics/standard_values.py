@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from camcomp.ground.datatypes import Floats
 
@@ -34,16 +35,12 @@ def circular_deviation(points: Sequence[Floats]) -> float:
     """Range of the radii of points (n, 2) about the centre of their least-squares circle (G, G(b))."""
     all_points = np.concatenate(points)
     known = all_points[np.isfinite(all_points).all(axis=1)]
-    middle = known.mean(axis=0)
-    p = known - middle
-    for _ in range(8):  # Gauss-Newton on the distances; the first step is a tenth of the radius at most
-        r = np.hypot(*p.T)
-        matrix = np.column_stack((p / r[:, None], np.ones(len(p))))
-        step = np.linalg.lstsq(matrix, r, rcond=None)[0]
-        p = p - step[:2]
-        if np.linalg.norm(step[:2]) < 1e-9:
-            break
-    return float(np.ptp(np.hypot(*p.T)))
+
+    def off(centre: Floats) -> Floats:
+        radius = np.hypot(*(known - centre).T)
+        return np.asarray(radius - radius.mean())
+
+    return float(np.ptp(least_squares(off, known.mean(axis=0), ftol=None, xtol=1e-12).fun))
 
 
 def pose_accuracy(off: Floats) -> float:
