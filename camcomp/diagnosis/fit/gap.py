@@ -38,11 +38,6 @@ def square_lengths(gap: Floats) -> Floats:
     return np.asarray(np.sum(gap[:, here] ** 2, axis=1)) if here.any() else np.full(len(gap), np.nan)
 
 
-def is_at_floor(problem: Problem, f: Fitted) -> bool:
-    """Whether the gap is not above the noise floor; f: the causes, which labels are seen beside."""
-    return float((gap_sizes(problem, f) ** 2).mean()) <= floor_um(problem) ** 2
-
-
 def floor_um(problem: Problem) -> float:
     """The floor in the channels in which the gap is stated, um."""
     part = main_channels(problem)

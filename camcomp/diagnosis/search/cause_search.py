@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camcomp.diagnosis.fit.cause_sets import Fitted, probabilities, temperature_of
-from camcomp.diagnosis.fit.gap import is_at_floor
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
@@ -144,8 +143,6 @@ def _keep_causes(
         f = sets.fit(kept)
         beyond = unexplained(problem, f)
         kind = unknown_kind(problem, f, beyond)
-    if at_first is None and f.members and is_at_floor(problem, f):
-        return sets.null, {}, beyond, None
     if kind is None and (at_first or instead):
         kind = worst(beyond).kind
     return f, present, beyond, kind
