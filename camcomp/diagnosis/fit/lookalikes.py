@@ -22,12 +22,7 @@ _FRAME = "workpiece_frame"
 
 
 def without_lookalikes(bench: Bench, candidates: Sequence[CandidateCause]) -> list[CandidateCause]:
-    """The candidates less those of effects with parameters by target that move the tip as another one does.
-
-    And less slopes of the guideways that these runs show as one shift each, because a run stays on one level: a
-    clamping that slips between runs does the same.
-    """
-    candidates = [each for each in candidates if not _a_shift_per_run(bench, each)]
+    """The candidates less those of effects with parameters by target that move the tip as another one does."""
     asked = [each for each in candidates if hasattr(each.effect, "SOUGHT")]
     if not asked or not any(run.measured.has("tip") for run in bench.runs):
         return [each for each in candidates if each not in asked]
@@ -68,19 +63,6 @@ def without_twins(bench: Bench, candidates: Sequence[CandidateCause]) -> list[Ca
             each = replace(each, without=tuple(twins))
         out.append(each)
     return out
-
-
-def _a_shift_per_run(bench: Bench, candidate: CandidateCause) -> bool:
-    """Whether an effect with targets of its own does to every run but one shift of the tip."""
-    if candidate.effect.TARGET != "named" or not any(run.measured.has("tip") for run in bench.runs):
-        return False
-    for column in candidate_columns(bench, candidate, shape_default(candidate)):
-        tips = [run[:, :3][np.isfinite(run[:, :3]).all(axis=1)] for run in column]
-        whole = sum(float(np.sum(each**2)) for each in tips)
-        within = sum(float(np.sum((each - each.mean(axis=0)) ** 2)) for each in tips if len(each))
-        if whole > 0.0 and within > whole / LARGE**2:
-            return False
-    return True
 
 
 def _tips(bench: Bench, candidates: Sequence[CandidateCause]) -> Floats:
