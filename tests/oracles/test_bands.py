@@ -128,9 +128,9 @@ def test_what_is_expected_of_the_program_is_what_drawn_machines_do(some):
     result, _, after, _ = some
     expected = result.bands.totals.expected()
     rms = np.sqrt((after**2).mean(axis=1))
-    assert expected.rms == pytest.approx(np.sqrt((after**2).mean()), rel=0.1)
-    assert expected.p95 == pytest.approx(np.quantile(after, 0.95), rel=0.15)
-    assert 0.9 <= ((expected.rms_interval[0] <= rms) & (rms <= expected.rms_interval[1])).mean()
+    assert expected.rms_um == pytest.approx(np.sqrt((after**2).mean()), rel=0.1)
+    assert expected.p95_um == pytest.approx(np.quantile(after, 0.95), rel=0.15)
+    assert 0.9 <= ((expected.rms_ci95_um[0] <= rms) & (rms <= expected.rms_ci95_um[1])).mean()
 
 
 @pytest.mark.campaign
@@ -141,8 +141,8 @@ def test_bands_hold_on_500_drawn_machines(tmp_path, sizes):
     inside, better = held(result, before, after, rows)
     print(f"90 % band holds {inside:.3f}, 90 % gain {better:.3f}")
     assert 0.87 <= inside <= 0.93 and 0.86 <= better <= 0.94, (inside, better)
-    assert result.bands.totals.expected().rms == pytest.approx(np.sqrt((after**2).mean()), rel=0.08)
-    assert result.bands.totals.expected().p95 == pytest.approx(np.quantile(after, 0.95), rel=0.08)
+    assert result.bands.totals.expected().rms_um == pytest.approx(np.sqrt((after**2).mean()), rel=0.08)
+    assert result.bands.totals.expected().p95_um == pytest.approx(np.quantile(after, 0.95), rel=0.08)
 
 
 def worse(result, sizes, count, points, seed):

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from camcomp.compensation.bands.scatter import LEVEL, TipMoves, gained, size_below
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.ground.records import dataclass
+from camcomp.ground.result import Result, Size
 from camcomp.model.config.spread import UncertainInput
 from camcomp.model.drawn import UncertainJob
 
@@ -18,13 +20,28 @@ LITTLE = 0.005  # of a correction
 POINTS = 600  # points of the program that they are judged on
 
 
-@dataclass(frozen=True)
-class Expected:
-    """The error of the machines drawn at the points of the program, um."""
+class ExpectedError(Result):
+    """Error after compensation of machines drawn from the uncertain numbers of the config, at the points of the program."""
 
-    rms: float  # over points and machines
-    p95: float  # LEVEL of all points of all machines stay below
-    rms_interval: tuple[float, float]  # that holds the rms of LEVEL of the machines
+    rms_um: Annotated[Size, Field(description="over points and machines")]
+    p95_um: Annotated[Size, Field(description="95 % of all points of all machines have an error below it")]
+    rms_ci95_um: Annotated[tuple[Size, Size], Field(description="holds the rms of 95 % of the machines")]
+
+
+class BandShare(Result):
+    """How much of the band an uncertain input makes."""
+
+    input: Annotated[str, Field(description="its group, or the key of the number")]
+    share: Annotated[float, Field(description="of the mean square")]
+
+
+class TakenCorrection(Result):
+    """Points that cut, by the share of the correction that a policy other than `full` took."""
+
+    policy: str
+    points: int
+    shrunk: Annotated[int, Field(description="points that take less than all of the correction")]
+    left_alone: Annotated[int, Field(description="points that take none of it")]
 
 
 class BandTotals:
@@ -64,10 +81,10 @@ class BandTotals:
         self.shrunk, self.alone = self.shrunk + other.shrunk, self.alone + other.alone
         return self
 
-    def expected(self) -> Expected:
+    def expected(self) -> ExpectedError:
         """Expected error, µm, over drawn machines; zero without points."""
         if not self.points:
-            return Expected(0.0, 0.0, (0.0, 0.0))
+            return ExpectedError.model_construct(rms_um=0.0, p95_um=0.0, rms_ci95_um=(0.0, 0.0))
         z = np.random.default_rng(0).standard_normal((len(self.inputs), MACHINES))
         total, sizes, weights = np.zeros(MACHINES), [], []
         for (error, moves), count in zip(self._thinned(), self._weight, strict=True):
@@ -80,7 +97,9 @@ class BandTotals:
         low, high = np.quantile(rms, (tail, 1.0 - tail))
         p95 = np.sqrt(_weighted_quantile(np.concatenate(sizes), np.concatenate(weights), LEVEL))
         mean = np.sqrt(self._square / self.points)
-        return Expected(1e3 * float(mean), 1e3 * float(p95), (1e3 * float(low), 1e3 * float(high)))
+        return ExpectedError.model_construct(
+            rms_um=1e3 * float(mean), p95_um=1e3 * float(p95), rms_ci95_um=(1e3 * float(low), 1e3 * float(high))
+        )
 
     def shares(self) -> list[tuple[str, float]]:
         """Every input's share of the mean square of the band, the largest first."""
@@ -157,11 +176,13 @@ def in_words(inputs: Sequence[UncertainInput], shares: Sequence[tuple[str, float
 
 def band_figures(totals: BandTotals, policy: str) -> dict[str, Any]:
     """The figures of a summary that uncertain numbers add."""
-    expected, shares = totals.expected(), totals.shares()
-    taken = {"policy": policy, "points": totals.points, "shrunk": totals.shrunk, "left_alone": totals.alone}
+    shares = totals.shares()
+    taken = TakenCorrection.model_construct(
+        policy=policy, points=totals.points, shrunk=totals.shrunk, left_alone=totals.alone
+    )
     return {
         **({} if policy == "full" else {"taken": taken}),
-        "expected": {"rms_um": expected.rms, "p95_um": expected.p95, "rms_ci95_um": expected.rms_interval},
-        "band": [{"input": name, "share": share} for name, share in shares],
+        "expected": totals.expected(),
+        "band": tuple(BandShare.model_construct(input=name, share=share) for name, share in shares),
         "advice": in_words(totals.inputs, shares),
     }

@@ -160,7 +160,7 @@ class InterpolatedMachine:
         gaps = (aimed.commanded - exact.commanded, free.tip - p, (aimed.rho - exact.rho) * known.reach)
         worst = max(1e3 * float(np.abs(each).max()) for each in gaps)
         known.keep(sound=worst <= BOUND_UM)
-        found = Interpolation(
+        found = Interpolation.model_construct(
             bound_um=BOUND_UM, checked=len(p), worst_um=worst if np.isfinite(worst) else float("inf"),
             worst_drive_force=float(np.nan_to_num(np.abs(free.drive - exact.drive), nan=np.inf).max()),
             tiles=int(known.used.sum()),

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import ConfigDict, Field
 
+from camcomp.compensation.bands.outcome import BandShare, ExpectedError, TakenCorrection
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.result import Result, Size
 from camcomp.ground.vectors import chosen, sizes
@@ -48,7 +49,9 @@ class ErrorSum:
 
     def figures(self) -> ErrorSize:
         """RMS and largest size."""
-        return ErrorSize(rms_um=float(np.sqrt(self._squares / max(self._count, 1))), max_um=self.most_um)
+        return ErrorSize.model_construct(
+            rms_um=float(np.sqrt(self._squares / max(self._count, 1))), max_um=self.most_um
+        )
 
 
 def worse_than_before(before_um: float, after_um: float, step_mm: float) -> list[tuple[str, str]]:
@@ -93,30 +96,6 @@ def interpolation_failed(found: Interpolation | None) -> list[tuple[str, str]]:
     return [("CC607", f"{found.worst_um:.3f} um between interpolated and exact points, more than {BOUND_UM:g} um")]
 
 
-class ExpectedError(Result):
-    """Error after compensation of machines drawn from the uncertain numbers of the config, at the points of the program."""
-
-    rms_um: Annotated[Size, Field(description="over points and machines")]
-    p95_um: Annotated[Size, Field(description="95 % of all points of all machines have an error below it")]
-    rms_ci95_um: Annotated[tuple[Size, Size], Field(description="holds the rms of 95 % of the machines")]
-
-
-class BandShare(Result):
-    """How much of the band an uncertain input makes."""
-
-    input: Annotated[str, Field(description="its group, or the key of the number")]
-    share: Annotated[float, Field(description="of the mean square")]
-
-
-class TakenCorrection(Result):
-    """Points that cut, by the share of the correction that a policy other than `full` took."""
-
-    policy: str
-    points: int
-    shrunk: Annotated[int, Field(description="points that take less than all of the correction")]
-    left_alone: Annotated[int, Field(description="points that take none of it")]
-
-
 class Force(Result):
     """Which cutting force was assumed."""
 
@@ -132,7 +111,7 @@ def job_figures(job: Job) -> dict[str, Any]:
     """Figures of the job for a summary: the assumed force, and the statements in the program's comments."""
     force = assumed_force(job.config)
     said = {"stated_in_program": job.taken.said} if job.taken.said else {}
-    return {"force": Force(model=force.model, engagement=force.engagement, text=force.text), **said}
+    return {"force": Force.model_construct(model=force.model, engagement=force.engagement, text=force.text), **said}
 
 
 _CONTROL_ADDS = "with the contour error of the controller, also next to joining lines; errors that the policy accepts are subtracted"

@@ -211,8 +211,8 @@ class Totals:
             "interpolation": self.interpolated,
             "warnings": self.warnings,
         }
-        return Summary.model_validate(
-            {key: each for key, each in figures.items() if each is not None or key in self.null}
+        return Summary.model_construct(
+            **{key: each for key, each in figures.items() if each is not None or key in self.null}
         )
 
     def failed_checks(self, tolerance_um: float) -> list[tuple[str, str]]:

@@ -376,7 +376,7 @@ def control_figures(
     """Figures of the accounts before and after compensation, with the time, s, that the control waits besides the moves."""
     before, after = (account.seconds + wait for account, wait in zip(accounts, waits, strict=True))
     return {
-        "cycle_time_s": CycleTime(before=before, after=after),
+        "cycle_time_s": CycleTime.model_construct(before=before, after=after),
         "control_mode": mode_name(modes),
         "control_mode_stated": all(each.stated for each in modes),
         "under_control": accounts[1].errors.figures(),
