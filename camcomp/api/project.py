@@ -11,7 +11,8 @@ from camcomp import __version__
 from camcomp.ground.errors import ConfigError, FileError, Location
 from camcomp.ground.files import display_name, read_bytes, shipped, write_all
 from camcomp.model.config.load import load_config
-from camcomp.model.config.yaml_tree import Node, plain, read_tree
+from camcomp.model.config.yaml_text import read_tree
+from camcomp.model.config.yaml_tree import Node, plain
 
 _README = f"""# A camcomp project
 

@@ -18,6 +18,7 @@ from camcomp.ground.errors import ConfigError, PhysicsError
 from camcomp.ground.records import dataclass, field, replace
 from camcomp.ground.vectors import shift, shifted
 from camcomp.model import signal_path
+from camcomp.model.config.base import Spec
 from camcomp.model.config.spec import Config
 from camcomp.model.config.taken import TakenFromProgram
 from camcomp.model.cutting.cut import Cut
@@ -66,10 +67,12 @@ class Job:
 
         Files that a section names count by their content; `source` remarks do not count.
         """
-        parts = self.config.model_dump(mode="json", include={"robot", "workpiece", "tool", "process", "effects"})
+        parts = {
+            name: _bare(getattr(self.config, name)) for name in ("robot", "workpiece", "tool", "process", "effects")
+        }
         if self.config.tools:
-            own = {"tools": {"__all__": {"file"}}}
-            parts["tools"] = self.config.model_dump(mode="json", include={"tools"}, exclude=own)["tools"]
+            tools = _bare(self.config.tools)
+            parts["tools"] = {number: {k: v for k, v in tool.items() if k != "file"} for number, tool in tools.items()}
         for section, keys in _LATER.items():  # keys of later versions: omitted unless they are given
             parts[section] = {key: v for key, v in parts[section].items() if v is not None or key not in keys}
         if self.config.control.absolute_accuracy:
@@ -77,7 +80,7 @@ class Job:
         if self.config.uncertain and self.config.compensation.policy != "full":  # then the program depends on them
             parts["policy"] = [self.config.compensation.policy]
             parts["policy"] += [[each.name, each.sd, each.group] for each in self.config.spreads]
-        return hashlib.sha256(json.dumps(_bare(parts), sort_keys=True).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
 
     @cached_property
     def frame(self) -> Frame:
@@ -202,8 +205,10 @@ _LATER = {"workpiece": {"stock"}, "tool": {"type", "corner_radius_mm", "point_de
 
 def _bare(value: Any) -> Any:
     """A section for the fingerprint: `source` remarks removed, file names replaced by a digest of the content."""
+    if isinstance(value, Spec):
+        value = {**vars(value), **(value.model_extra or {})}
     if isinstance(value, dict):
-        return {key: _bare(each) for key, each in value.items() if key != "source"}
+        return {str(key): _bare(each) for key, each in value.items() if key != "source"}
     if isinstance(value, list):
         return [_bare(each) for each in value]
     if isinstance(value, str) and FilePath(value).is_absolute() and FilePath(value).is_file():

@@ -18,7 +18,8 @@ from camcomp.ground.files import shipped
 from camcomp.ground.rules import RULES
 from camcomp.model.config.key_reference import ROOTS, default_text, rows, sections, title, type_text, unit_of
 from camcomp.model.config.load import params_of
-from camcomp.model.config.yaml_tree import Node, plain, read_tree
+from camcomp.model.config.yaml_text import read_tree
+from camcomp.model.config.yaml_tree import Node, plain
 from camcomp.model.law.covariates import AT_DRIVE, AT_TIP, LOADS
 from camcomp.model.law.expression import FUNCTIONS
 from camcomp.model.motion.log_columns import DYNO, LINE, TEMPERATURE, TIME, TIP, TIP_SD

@@ -14,7 +14,8 @@ from camcomp.ground.errors import FileError
 from camcomp.ground.files import read_bytes
 from camcomp.ground.records import replace
 from camcomp.model.config.tool_table import TabledTool, ToolFile, refused
-from camcomp.model.config.yaml_tree import Node, child, read_tree
+from camcomp.model.config.yaml_text import read_tree
+from camcomp.model.config.yaml_tree import Node, child
 
 TITLE = "FreeCAD tool library (.fctl) or tool bit (.fctb)"
 SUFFIXES = (".fctl", ".fctb")

@@ -18,7 +18,7 @@ def loaded(tmp_path, monkeypatch):
     """Function that runs a command line in a folder of its own and returns how often each YAML file was loaded."""
     monkeypatch.chdir(tmp_path)
     count = Counter()
-    read = load._read_merged
+    read = load._read_texts
 
     def counted(paths):
         count.update(Path(each).name for each in paths)
@@ -31,7 +31,7 @@ def loaded(tmp_path, monkeypatch):
         assert done.value.code in (0, None)
         return dict(count)
 
-    monkeypatch.setattr(load, "_read_merged", counted)
+    monkeypatch.setattr(load, "_read_texts", counted)
     return run
 
 

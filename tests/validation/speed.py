@@ -26,8 +26,8 @@ for text in open(sys.argv[1]):
 PAGE = """# Speed
 
 Processor time of `camcomp compensate` by the length of the program: straight moves of 0.12 mm in a pocketed groove,
-`config/orthoglide-1deg.yaml`, start-up included, compiled code and interpolated cubes on disk. Each program was also read by
-pygcode, which does nothing else with it, in the same run; a program of more than {most} lines counts as a multiple of one of
+`config/orthoglide-1deg.yaml`, start-up included, compiled code, interpolated cubes and the checked machine file on disk. Each
+program was also read by pygcode, which does nothing else with it, in the same run; a program of more than {most} lines counts as a multiple of one of
 that length. Code `{commit}` of {date}; `python -m tests.validation run speed` measures anew.
 
 | lines | processor time | per line | memory | pygcode reads it in | times faster |

@@ -86,8 +86,8 @@ def key_of_config(plan: Plan) -> str:
         plan.version, plan.method, plan.tolerance_um, plan.joints, plan.stock, plan.passes, config.control.dialect,
     )  # fmt: skip
     digest = hashlib.sha256(repr(options).encode())
-    assert config._tree is not None  # every loaded config has one
-    for name, node in sorted(leaves(config._tree), key=lambda each: each[0]):
+    assert config.tree is not None  # every loaded config has one
+    for name, node in sorted(leaves(config.tree), key=lambda each: each[0]):
         value = plain(node)
         key = name.rpartition(".")[2]
         if (key == "file" or key.endswith("_file")) and isinstance(value, str):

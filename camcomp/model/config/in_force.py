@@ -11,8 +11,8 @@ from camcomp.model.config.yaml_tree import leaves, plain
 
 def values_in_force(config: Config, *, folders: bool = False) -> Iterator[tuple[str, str, str]]:
     """(key, value, place) of all values, written ones first, then defaults; folders: file names with their folder."""
-    assert config._tree is not None  # every loaded config has one
-    written = dict(leaves(config._tree))
+    assert config.tree is not None  # every loaded config has one
+    written = dict(leaves(config.tree))
     spread: dict[str, Spread] = {each.name: each for each in config.spreads}
     for name, node in written.items():
         file = node.at.file if folders else PurePath(node.at.file).name

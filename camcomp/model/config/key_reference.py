@@ -22,7 +22,8 @@ from camcomp.model.config.base import Spec
 from camcomp.model.config.cutting_tool import ToolTableFile
 from camcomp.model.config.load import params_of
 from camcomp.model.config.spec import Config, EffectChoice, Experiment, ForceChoice
-from camcomp.model.config.yaml_tree import Node, plain, read_tree
+from camcomp.model.config.yaml_text import read_tree
+from camcomp.model.config.yaml_tree import Node, plain
 
 SOURCE = "source"  # key of every mapping, described once
 _UNIT = re.compile(r"(?:^|_)((?:mm[24]?|um|Nmm|N|rad|deg|s|ms|min|rpm|kg|C|ppm|mrad)(?:_per_[A-Za-z]+2?)?)$")

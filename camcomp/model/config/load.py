@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,14 +15,15 @@ from camcomp.ground.files import display_name, read_bytes
 from camcomp.ground.records import dataclass, replace
 from camcomp.model.config import linuxcnc_ini
 from camcomp.model.config.base import Spec
+from camcomp.model.config.effect_entries import key_of_effect, merged_entries
+from camcomp.model.config.kept import KeptConfig, Texts
 from camcomp.model.config.robot import RevoluteActuator, RobotSpec
 from camcomp.model.config.spec import Config, EffectChoice, Experiment
 from camcomp.model.config.spread import Spread, UncertainInput, replaced, without_spreads
 from camcomp.model.config.stated import in_stated_dialect
 from camcomp.model.config.tool_table import with_tool_tables
-from camcomp.model.config.write_back import key_of_effect, merged_entries
 from camcomp.model.config.yaml_check import check, choose
-from camcomp.model.config.yaml_tree import Node, merge, plain, read_tree, tree_of
+from camcomp.model.config.yaml_tree import Node, merge, plain, tree_of
 
 ROBOT_KEYS = ("name", "source", "start_reference_mm")  # belong to the robot, whatever plug-in builds its chains
 
@@ -37,7 +39,21 @@ def load_config(paths: Sequence[Path | str]) -> Config:
         ConfigError: exit code 2, one entry per error of any file.
         FileError: exit code 5, a file cannot be read.
     """
-    tree, errors = _read_merged(paths)
+    texts, errors = _read_texts(paths)
+    kept = KeptConfig(texts)
+    config = None if errors else kept.load()
+    if config is None:
+        tree, config = _checked_config(texts, errors)
+        kept.save(tree, config)
+    else:
+        config._read_tree = partial(_merged_texts, texts)
+    return in_stated_dialect(config)
+
+
+def _checked_config(texts: Texts, errors: list[CamcompError]) -> tuple[Node, Config]:
+    """The tree of machine files and its configuration. errors: of files that cannot be read."""
+    tree, more = _merged_texts(texts)
+    errors = [*errors, *more]
     if tree is None:
         _raise(errors)
         raise ConfigError("CC212", "no configuration is given", hint="name one with --config FILE")
@@ -46,7 +62,7 @@ def load_config(paths: Sequence[Path | str]) -> Config:
     _, config, more = _checked(tree)
     _raise([*errors, *more])
     assert config is not None
-    return in_stated_dialect(config)
+    return tree, config
 
 
 def check_config(paths: Sequence[Path | str]) -> Config | None:
@@ -140,8 +156,9 @@ def overridden(config: Config, over: Mapping[str, Any], starts: Mapping[str, flo
     Raises:
         ConfigError: a value is refused.
     """
-    assert config._tree is not None  # every loaded config has one
-    tree = merge(config._tree, tree_of(dict(over), config._tree.at))
+    own = config.tree
+    assert own is not None  # every loaded config has one
+    tree = merge(own, tree_of(dict(over), own.at))
     if starts:
         tree = replace(tree, value={**tree.value, "robot": _starting(tree.value["robot"], starts)})
     found, errors = _check_config(tree)
@@ -166,8 +183,8 @@ def _starting(node: Node, starts: Mapping[str, float]) -> Node:
 
 def varied(config: Config, source: UncertainInput, size: float) -> Config | None:
     """The configuration with one input `size` standard deviations off its value; None if the spec refuses it."""
-    assert config._tree is not None  # every loaded config has one
-    found, errors = _check_config(replaced(config._tree, _moved(source.members, size)))
+    assert config.tree is not None  # every loaded config has one
+    found, errors = _check_config(replaced(config.tree, _moved(source.members, size)))
     return None if errors else found
 
 
@@ -194,19 +211,33 @@ def _certain(tree: Node) -> tuple[Node, list[Spread], list[CamcompError]]:
 
 
 def _read_merged(paths: Sequence[Path | str]) -> tuple[Node | None, list[CamcompError]]:
-    merged: Node | None = None
+    texts, errors = _read_texts(paths)
+    tree, more = _merged_texts(texts)
+    return tree, [*errors, *more]
+
+
+def _read_texts(paths: Sequence[Path | str]) -> tuple[Texts, list[CamcompError]]:
+    texts: list[tuple[Path | str, bytes]] = []
     errors: list[CamcompError] = []
     for path in paths:
         try:
-            data = read_bytes(path)
+            texts.append((path, read_bytes(path)))
         except FileError as error:
             errors.append(error)
-            continue
+    return texts, errors
+
+
+def _merged_texts(texts: Texts) -> tuple[Node | None, list[CamcompError]]:
+    merged: Node | None = None
+    errors: list[CamcompError] = []
+    for path, data in texts:
         if Path(path).suffix.lower() == linuxcnc_ini.SUFFIX:
             tree, wrong = linuxcnc_ini.read_layer(data, display_name(path))
             errors += wrong
             merged = tree if merged is None else merge(merged, tree) if tree is not None else merged
             continue
+        from camcomp.model.config.yaml_text import read_tree  # slow import, needed without a kept configuration only
+
         tree, more = read_tree(data, display_name(path))
         if not _is_ours(tree, data) and not any(each.rule in ("CC211", "CC217") for each in more):
             message = "this is neither a machine file nor an experiment: it has none of their sections"

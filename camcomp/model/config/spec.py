@@ -1,5 +1,6 @@
 """YAML specs of the sections of a machine file, and of an experiment file."""
 
+from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, PrivateAttr, model_validator
@@ -244,6 +245,7 @@ class Config(Spec):
     )
 
     _tree: Node | None = PrivateAttr(None)
+    _read_tree: Callable[[], tuple[Node | None, Any]] | None = PrivateAttr(None)  # of a kept one, when it is asked for
     _spreads: tuple[Spread, ...] = PrivateAttr(())
     _doubts: tuple[Doubt, ...] = PrivateAttr(())
 
@@ -262,9 +264,16 @@ class Config(Spec):
         """Whether a number has a positive standard deviation."""
         return any(each.sd > 0.0 for each in self._spreads)
 
+    @property
+    def tree(self) -> Node | None:
+        """The values as they were written, with their locations."""
+        if self._tree is None and self._read_tree is not None:
+            self._tree = self._read_tree()[0]
+        return self._tree
+
     def at(self, *keys: str | int) -> Location | None:
         """Where the value under these keys was written; the nearest mapping above it when it is a default."""
-        return find(self._tree, keys).at if self._tree is not None else None
+        return find(self.tree, keys).at if self.tree is not None else None
 
 
 class RunSpec(Spec):

@@ -2,7 +2,7 @@
 
 import io
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any, Protocol
 
@@ -10,11 +10,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from camcomp.ground import shelf
+from camcomp.model.config.effect_entries import certain, key_of_effect, key_of_entry, merged_entries
 from camcomp.model.config.spread import HALF_95
-
-# Parameters that distinguish several entries of one effect and target; a law is unique by all its keys.
-_APART = {"disturbance": ("from_s", "to_s"), "screw_cyclic": ("pitch_mm",), "joint_curve": ("seen_deg",)}
-_LAWS = {"formula", "map"}
 
 
 class EstimatedValue(Protocol):
@@ -71,8 +68,8 @@ def carried(text: str, earlier: Sequence[str], causes: Sequence[NamedEffect]) ->
     for each in earlier:
         below = merged_entries(below, (YAML(typ="safe").load(each) or {}).get("effects") or [])
     own = list((tree or {}).get("effects") or [])
-    mine = {_key_of_entry(each) for each in own}
-    more = [each for each in below if each["effect"] in found and _key_of_entry(each) not in mine]
+    mine = {key_of_entry(each) for each in own}
+    more = [each for each in below if each["effect"] in found and key_of_entry(each) not in mine]
     if not more:
         return text
     tree["effects"] = tree.get("effects") or CommentedSeq()
@@ -81,32 +78,6 @@ def carried(text: str, earlier: Sequence[str], causes: Sequence[NamedEffect]) ->
     out = io.StringIO()
     yaml.dump(tree, out)
     return out.getvalue()
-
-
-def merged_entries(
-    base: Sequence[Any], over: Sequence[Any], data: Callable[[Any], Any] = lambda each: each
-) -> list[Any]:
-    """Entries of `effects:` of two files: one of the later file replaces the same one of the earlier, in its place.
-
-    data: plain value of an entry.
-    """
-    out = list(base)
-    keys = [_key_of_entry(data(each)) for each in out]
-    for each in over:
-        key = _key_of_entry(data(each))
-        if key is not None and key in keys:
-            out[keys.index(key)] = each
-        else:
-            out.append(each)
-    return out
-
-
-def _key_of_entry(entry: Any) -> tuple[Any, ...] | None:
-    """`key_of_effect` of an entry as in YAML; None for another node."""
-    if not isinstance(entry, Mapping):
-        return None
-    plain = {key: _plain(value) for key, value in entry.items()}
-    return key_of_effect(str(plain.get("effect")), plain.get("target"), plain)
 
 
 def _round_trip() -> YAML:
@@ -170,20 +141,13 @@ def with_causes(
     return out.getvalue()
 
 
-def key_of_effect(effect: str, target: str | None, values: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Identity of an entry of `effects:`: effect, target, and the parameters that distinguish several of a kind."""
-    names = _APART.get(effect, ())
-    own = tuple(str(values.get(name)) for name in names)
-    return (effect, target, str(sorted(values.items(), key=str)) if effect in _LAWS else own)
-
-
 def _new_ones(
     effects: CommentedSeq, cause: NamedEffect, actuators: Sequence[str]
 ) -> list[tuple[NamedEffect, str | None]]:
     """The cause with its targets that have no entry yet; existing entries are changed in place."""
     values = {**{name: each.value for name, each in cause.parameters.items()}, **cause.settings}
     wanted = key_of_effect(cause.effect, cause.target, values)
-    plain = [{key: _plain(value) for key, value in each.items()} for each in effects]
+    plain = [{key: certain(value) for key, value in each.items()} for each in effects]
     keys = [key_of_effect(str(each.get("effect")), each.get("target"), each) for each in plain]
     if cause.target is not None and (wanted[0], None, *wanted[2:]) in keys and actuators:
         _part(effects, keys.index((wanted[0], None, *wanted[2:])), actuators)
@@ -216,17 +180,12 @@ def _change(entry: CommentedMap, cause: NamedEffect) -> None:
     for name, found in cause.parameters.items():
         low, high = found.ci95
         record = records.get(name)
-        before = _plain(entry.get(name))
+        before = certain(entry.get(name))
         value = found.value
         if record is not None and not record.shape and isinstance(before, int | float):
             value = float(f"{record.on_top(float(before), found.value):.6g}")
         entry[name] = _number(record, value, found.ci95)
         entry.yaml_add_eol_comment(f"found on top: {found.value:g}, 95 %: {low:g} to {high:g}", name)
-
-
-def _plain(value: Any) -> Any:
-    """The plain value of a number that may be written as {value, sd}."""
-    return value["value"] if isinstance(value, Mapping) and "value" in value else value
 
 
 def _entry(law: Mapping[str, Any]) -> CommentedMap:

@@ -8,7 +8,8 @@ import pytest
 
 from camcomp.api.settings import schema_of
 from camcomp.model.config.key_reference import unit_of
-from camcomp.model.config.yaml_tree import plain, read_tree
+from camcomp.model.config.yaml_text import read_tree
+from camcomp.model.config.yaml_tree import plain
 
 TEXT = re.compile(
     r"(?P<meaning>.{3,})\. Unit: (?P<unit>\S.*?)\. Default: (?P<default>.+)\. Example: (?P<example>.+)", re.DOTALL

@@ -2,7 +2,8 @@ import time
 
 import pytest
 
-from camcomp.model.config.yaml_tree import find, leaves, merge, plain, read_tree
+from camcomp.model.config.yaml_text import read_tree
+from camcomp.model.config.yaml_tree import find, leaves, merge, plain
 from tests.pace import soon
 
 
