@@ -76,6 +76,13 @@ def test_a_sample_too_far_from_its_exact_solutions_fails_the_program(job, progra
     assert "CC607" in {rule for rule, _ in compensate(program, job).failed}
 
 
+def test_a_job_with_answers_keeps_what_it_has_built(job):
+    machine, conditions, exact = job.machine, job.conditions, job.correctable
+    other = with_answers(job)
+    assert other.machine is machine and other.conditions is conditions and other.fingerprint == job.fingerprint
+    assert other.correctable is not exact and job.real_machine.answers is None is not other.real_machine.answers
+
+
 @pytest.mark.parametrize("mode", [FREE, TARGET])
 def test_single_points_are_the_exact_ones(job, mode):
     machine = with_answers(job).real_machine

@@ -13,6 +13,7 @@ from camcomp.compensation.long.runs import NotInPieces
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.result import BOUND_UM
 from camcomp.compensation.program.totals import Totals
+from camcomp.compensation.report import tables
 from camcomp.gcode.linear_rows import csv_rows
 from camcomp.gcode.stamp import is_stamped
 from camcomp.ground.errors import CheckFailed, FileError, PhysicsError, ProgramError
@@ -352,6 +353,7 @@ def test_compiled_csv_is_that_of_python():
     rng = np.random.default_rng(5)
     values = rng.normal(0, 100, (200, 4)) * [1, 1e-7, 1e3, 1]
     values[3, 2], values[4, 0], values[5, 1] = np.nan, -0.0, -4e-7
+    values[6, 2], values[7, 0] = -8_999_999_999.5, 8_999_999_999.25  # the largest have 19 digits
     line = rng.integers(1, 10**6, 200)
     text = csv_rows(line, values, np.array([6, 6, 9, 6])).decode()
     for i, row in enumerate(text.splitlines()):
@@ -360,6 +362,15 @@ def test_compiled_csv_is_that_of_python():
         assert row.split(",")[0] == str(line[i])
         for ours, theirs in zip(row.split(",")[1:], cells, strict=True):
             assert ours == theirs or abs(float(ours) - float(theirs)) <= 1.01e-6
+
+
+def test_tables_are_the_same_in_stretches_of_any_length(monkeypatch):
+    line, values, files = np.arange(1, 24), np.random.default_rng(6).normal(0, 100, (23, 2)), []
+    for rows in (tables.AT_ONCE, 7, 23):
+        monkeypatch.setattr(tables, "AT_ONCE", rows)
+        files.append(io.BytesIO())
+        tables.CsvFile(files[-1], ["line", "x_mm", "a_rad"]).rows(line, values)
+    assert len({each.getvalue() for each in files}) == 1 and files[0].getvalue().count(b"\n") == 24
 
 
 def test_a_control_with_four_decimals_of_an_inch(orthoglide):
