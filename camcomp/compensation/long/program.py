@@ -172,7 +172,8 @@ class LongProgram:
         first = int(before is not None)
         part = Part(first, first + len(piece.path), self._output)
         program = piece.between(before, after)
-        here, minutes = piece.run.row0 / self._lines, minutes_of(self.job, program.path)
+        here = piece.run.row0 / self._lines
+        minutes = minutes_of(self.job, program.path) if self.job.causes else np.zeros(len(program.path))
         began = self._minutes - float(minutes[:first].sum())
         self._minutes += float(minutes[part.first : part.last].sum())
         with part_of_work(here, here):

@@ -326,7 +326,7 @@ class _Correction:
         curves = rows.curves(self.program.path, written.end, written.centre)
         told = path_geometry.points(curves, points.row, points.fraction)
         after = see(asked, points, told, written.words)
-        missed = after.error - asked.accepted(points.piece, points.w, points.travel, points.before)
+        missed = asked.missed(after.error, points.piece, points.w, points.travel, points.before)
         size = np.where(after.status == 0, sizes(missed), np.inf)
         if after.tilt is not None:
             size = np.maximum(size, np.nan_to_num(after.tilt) * self.goal[points.piece] / MOST_TILT_RAD)
@@ -368,11 +368,12 @@ class _Correction:
         return Compensated(
             program=program, written=written, rows=rows, s=s, t=times_of(job, program, rows, s), nominal=nominal, state=state,
             force=acting_force(job, state.rho, points.travel, points.end), uncorrected=before.tip,
-            before=chosen(before.error, judged), after=chosen(after.error, judged), control=control, judged=chosen(points.row, judged),
+            before=chosen(before.error, judged), control=control, judged=control.points.move, missed=control.points.error,
+            after=control.points.error if found.missed is after.error else chosen(after.error, judged),
             iterations=self.aimed.iterations, method=self.method, without_spindle=still, warnings=warnings,
             feeds=int(np.count_nonzero(np.diff(track.motion[self.feeding], prepend=-1))),
             moved=not self.kept[self.feeding].all(), engaged=track.engaged,
-            bands=self._bands(found, before, written), missed=chosen(found.missed, judged),
+            bands=self._bands(found, before, written),
             orienting=self.orienting, tilt_after=None if after.tilt is None else chosen(after.tilt, judged),
             programmed_words=None if self.orienting is None else self.asked.words(rows.piece, rows.w),
         )  # fmt: skip

@@ -118,8 +118,8 @@ def travel_of(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
     if turn is not None:
         rotation = platform_rotations(job, turn.form, turn.words(track.motion[piece], track.u(piece, w)))
     if not job.causes:
-        none = np.zeros(len(piece))
-        return Travel(force=force, time=none, cut_min=none, stop=none > 0.0, rotation=rotation)
+        none, never = np.zeros(len(piece)), np.zeros(len(piece), np.bool_)
+        return Travel(force=force, time=none, cut_min=none, stop=never, rotation=rotation)
     minutes = track.length / _speeds(job, track.path)[track.motion]
     start = track.began_min + np.cumsum(minutes) - minutes
     cut = minutes * track.cutting

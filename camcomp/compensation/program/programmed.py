@@ -55,12 +55,11 @@ class Programmed:
         target = self.track.points(piece, w) if target is None else target
         return target + self.shares.at(self.track, piece, w)[:, None] * (commanded - target)
 
-    def accepted(self, piece: Ints, w: Floats, travel: Travel, before: Floats | None = None) -> Floats:
-        """Tip errors (k, 3) mm that the policy accepts; NaN without a solution."""
+    def missed(self, error: Floats, piece: Ints, w: Floats, travel: Travel, before: Floats | None = None) -> Floats:
+        """Errors (k, 3) mm without those that the policy accepts, NaN without a solution; without a policy the errors themselves."""
         if self.shares is None:
-            return np.zeros((len(w), 3))
+            return error
         target = self.track.points(piece, w)
         aimed = aim_at(self.job, target, travel, "newton").commanded
         tip, _ = respond(self.job, self.taken(piece, w, aimed), travel, target, before=before)
-        out: Floats = tip - target
-        return out
+        return error - (tip - target)

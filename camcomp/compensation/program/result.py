@@ -40,12 +40,14 @@ class ErrorSum:
     def __init__(self) -> None:
         self.most_um, self._squares, self._count = 0.0, 0.0, 0
 
-    def add(self, error: Floats) -> None:
-        """Add errors (k, 3) mm; NaN rows are ignored."""
+    def add(self, error: Floats) -> float:
+        """Add errors (k, 3) mm; NaN rows are ignored. Returns the largest size, um."""
         size = 1e3 * sizes(error)
         size = chosen(size, np.isfinite(size))
         self._squares, self._count = self._squares + float(np.sum(size**2)), self._count + len(size)
-        self.most_um = max(self.most_um, float(size.max(initial=0.0)))
+        most = float(size.max(initial=0.0))
+        self.most_um = max(self.most_um, most)
+        return most
 
     def figures(self) -> ErrorSize:
         """RMS and largest size."""

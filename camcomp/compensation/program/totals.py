@@ -56,7 +56,7 @@ class Totals:
     def __init__(self, job: Job, name: str = "", *, tolerance_um: float = np.inf, tabled: bool = True) -> None:
         """name: of the program. tolerance_um: beyond which the controller is warned of. tabled: rows are asked for."""
         self.job, self._name, self._tabled = job, name, tabled
-        self.before, self.after, self.missed = ErrorSum(), ErrorSum(), ErrorSum()
+        self.before, self.after, self.missed_um = ErrorSum(), ErrorSum(), 0.0
         self.points = self.motions = self.lines_in = self.lines_out = self.joins = self.iterations = 0
         self.change = self.force = np.zeros(len(job.machine.actuators))
         self.tilt, self.method, self.step_mm = 0.0, "newton", 0.0  # step of the output
@@ -113,8 +113,11 @@ class Totals:
         self.change = np.fmax(self.change, _largest(out.joints - out.nominal, corrected))
         self.force = np.fmax(self.force, _largest(out.drive, corrected))
         self.tilt = float(np.fmax.reduce(chosen(sizes(state.tilt[own]), corrected), initial=self.tilt))
-        for total, error in ((self.before, result.before), (self.after, result.after), (self.missed, result.missed)):
-            total.add(error)
+        self.before.add(result.before)
+        most = self.after.add(result.after)
+        if result.missed is not result.after:
+            most = ErrorSum().add(result.missed)
+        self.missed_um = max(self.missed_um, most)
         self._add_beyond(out)
         self.iterations = max(self.iterations, result.iterations)
         self.step_mm = max(self.step_mm, result.program.step_mm(self.job.config.control.resolution_mm))
@@ -218,7 +221,7 @@ class Totals:
     def failed_checks(self, tolerance_um: float) -> list[tuple[str, str]]:
         """Rule id and text of every check that the program does not pass."""
         out, machine = [], self.job.machine
-        worst = self.missed.most_um
+        worst = self.missed_um
         if not worst <= tolerance_um * (1.0 + 1e-9):
             out.append(("CC601", f"{worst:.3f} um are left, more than the tolerance of {tolerance_um:g} um"))
         out += worse_than_before(self.before.most_um, self.after.most_um, self.step_mm)

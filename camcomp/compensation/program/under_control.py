@@ -150,7 +150,8 @@ class ControlAccount:
 
     def _judge(self, points: PointsOnMoves, error: Floats) -> None:
         self.latest = error
-        self.errors.add(error)
+        if 1e-3 * self.errors.add(error) <= self.tolerance:
+            return
         size = sizes(error)
         far = np.flatnonzero(np.isfinite(size) & (size > self.tolerance * (1.0 + ROUND_OFF)))
         if len(far):

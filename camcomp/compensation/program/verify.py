@@ -193,7 +193,7 @@ class _Points:
         asked, travel = self.asked, self.asked.travel(self.piece, w)
         travel = travel if self.rotation is None else replace(travel, rotation=self.rotation)
         tip, _ = respond(asked.job, self.commanded, travel)
-        return travel, tip, tip - asked.track.points(self.piece, w) - asked.accepted(self.piece, w, travel)
+        return travel, tip, asked.missed(tip - asked.track.points(self.piece, w), self.piece, w, travel)
 
     def fraction(self, reach: Floats) -> Floats:
         """First guess (k,) of the fraction of each piece: by the length of the path that ought to be commanded."""
