@@ -14,25 +14,30 @@ from camcomp.model.hysteresis import first_order
 STAGE = "control"
 TARGET = "either"
 PLAIN = "lag of the position loop"
-REMEDY = "raise the gain of the position loop (kv) or switch feed-forward on, the same on all axes; or cut more slowly"
+REMEDY = (
+    "raise the gain of the position loop (kv) or switch feed-forward on, the same on all axes; or cut more slowly; "
+    "below 0 ms: log set-points and encoders of one instant, or lower the feed-forward"
+)
 SOURCE = "first-order position loop, tau = 1/kv (Gross, Hamann, Wiegaertner: Electrical feed drives in automation)"
 _KV = "loop gains kv of 100 to 2000 1/s"
-FITTED = (Parameter("time_constant_ms", "ms", 0.0, 0.0, 500.0, 3.0, 0.005, _KV, sign=1),)
+FITTED = (Parameter("time_constant_ms", "ms", 0.0, -500.0, 500.0, 3.0, 0.005, _KV),)
 PARAMETERS = (
     Parameter("time_constant_ms", "ms", 0.0, -500.0, 500.0, 3.0, 0.005, f"{_KV}; joints of arms up to 200 ms"),
 )
 
 
 def on_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
-    """Encoder positions (n, m); the lag starts settled, at the speed at which a recording begins."""
+    """Encoder positions (n, m); the lag starts settled, at the speed at which a recording begins; a lead goes on at that of its end."""
     tau = p["time_constant_ms"] * 1e-3
     if tau == 0.0 or not motion.ordered:
         return position
     aimed = which > 0
     out = position.copy()
     if tau < 0.0:
+        ahead = motion.time - tau
+        beyond = np.maximum(ahead - motion.time[-1], 0.0)
         for j in np.flatnonzero(aimed.any(axis=0) if aimed.ndim > 1 else aimed):
-            out[:, j] = np.interp(motion.time - tau, motion.time, position[:, j])
+            out[:, j] = np.interp(ahead, motion.time, position[:, j]) + beyond * motion.speed[-1, j]
         return out
     seams = None if motion.seams is None else motion.seams.of(aimed)
     out[:, aimed] = first_order(position[:, aimed], motion.time, tau, seams)

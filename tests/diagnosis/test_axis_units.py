@@ -6,6 +6,7 @@ import yaml
 from ruamel.yaml import YAML
 
 from camcomp.api.diagnosis import diagnose
+from camcomp.diagnosis.report.answer import verdict_text
 from camcomp.diagnosis.result.types import Estimate, FoundCause
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
@@ -91,6 +92,22 @@ def test_a_loop_found_on_top_of_a_stated_one_is_one_loop(tmp_path):
     (entry,) = (each for each in tree["effects"] if each["effect"] == "servo_overshoot")
     assert entry["period_ms"]["value"] == pytest.approx(50.0, rel=0.03)
     assert entry["damping"]["value"] == pytest.approx(0.5, rel=0.2)
+
+
+def test_set_points_that_are_logged_late_are_told_in_a_joint_that_does_not_move_the_tip(tmp_path):
+    """J6 turns about the tip; its encoder is 60 ms ahead of the log's set-points."""
+    (tmp_path / "machine.yaml").write_text(SIX)
+    for seed, name in enumerate("ab"):
+        t, noise = np.arange(0, 10, 0.01), np.random.default_rng(seed).normal(0, 2e-5, 1000)
+        asked, ahead = (0.4 * np.sin((0.8 + seed) * at) + 0.2 * np.sin(2.9 * at + 1) for at in (t, t + 0.06))
+        write(tmp_path, f"{name}.csv", {"t_s": t, "cmd_J6_rad": asked, "act_J6_rad": ahead + noise})
+    result = diagnose(experiment(tmp_path, ["machine.yaml"], ("a", "b"), holdout=["b"])).result
+    assert result.verdict == "identified" and result.gap.rms_um == 0.0
+    (cause,) = result.causes
+    assert cause.parameters["time_constant_ms"].value == pytest.approx(-60.0, rel=0.02)
+    left = result.shrinkage.actuators["J6"]
+    assert left.after_rms < 0.01 * left.before_rms
+    assert "No error moves the tip: J6 errs by" in verdict_text(result)
 
 
 def ripple(folder, name, frequency, seed):

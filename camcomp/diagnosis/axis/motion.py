@@ -40,10 +40,10 @@ def encoder_width(runs: list[AxisRun], train: list[int], bodies: list[Floats] | 
 
 
 def lateness(runs: list[AxisRun], gaps: list[Floats], train: list[int]) -> float:
-    """How late (s) the axis follows its set-points, on average."""
+    """How late (s) the axis follows its set-points, on average; below 0 where these are logged late."""
     moves = [travel(runs[k].time, runs[k].setpoint) for k in train]
     A = np.concatenate([_usual(m)[runs[k].clear] for k, m in zip(train, moves, strict=True)])
-    return float(np.clip(solve(A, np.concatenate([gaps[k][runs[k].clear] for k in train]))[2], 0.0, LATEST_S))
+    return float(np.clip(solve(A, np.concatenate([gaps[k][runs[k].clear] for k in train]))[2], -LATEST_S, LATEST_S))
 
 
 def motion_of(
@@ -91,7 +91,8 @@ def motion_of(
     # time constants after which a late axis shows no more how it moved before its log began
     fades = [max(float(np.log(max(np.abs(r.gap).max(), 1e-300) / REPEATABILITY_MM)), 0.0) for r in runs]
     begun = [r.time >= r.time[0] + late * (fades[k] if k in train else 0.0) for k, r in enumerate(runs)]
-    return kept(encoders if by_encoder else setpoints, begun)
+    asked = [r.time <= r.time[-1] + min(late, 0.0) for r in runs]
+    return kept(encoders if by_encoder else setpoints, [a & b for a, b in zip(begun, asked, strict=True)])
 
 
 def _beside(bodies: list[Floats] | None, runs: list[AxisRun], which: list[int]) -> list[Floats]:

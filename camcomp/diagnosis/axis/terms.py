@@ -52,13 +52,15 @@ class AxisTravel:
 def travel(time: Floats, position: Floats, wide: int = WIDE[0], late: float | None = None) -> AxisTravel:
     """Local cubics over 2 wide + 1 samples (Savitzky, Golay 1964) of positions (n,) at times (n,) s.
 
-    late: time constant s with which the axis follows positions that are free of noise: no cubics for the position then, for
-    they turn round before and after a stop. Rows that are lost and clocks that tremble are led over: cubics want even steps.
+    late: time constant s with which the axis follows positions that are free of noise, or, below 0, by how much it is ahead of
+    them: no cubics for the position then, for they turn round before and after a stop. Rows that are lost and clocks that tremble
+    are led over: cubics want even steps.
     """
     dt = float(np.median(np.diff(time)))
     even = time[0] + dt * np.arange(max(round(float(time[-1] - time[0]) / dt) + 1, 2 * wide + 1))
-    values = Akima1DInterpolator(time, position)(np.minimum(even, time[-1]))
-    if late:
+    ahead = -min(late or 0.0, 0.0)
+    values = Akima1DInterpolator(time, position)(np.minimum(even + ahead, time[-1]))
+    if late and not ahead:
         begins = Seams(np.zeros(1, np.int64), np.full(1, np.inf), np.full((1, 1), (values[1] - values[0]) / dt))
         values = first_order(values[:, None], even, late, begins)[:, 0]
     parts = [savgol_filter(values, 2 * wide + 1, 3, deriv=k, delta=dt, mode="interp") for k in range(3)]

@@ -25,6 +25,9 @@ def verdict_text(result: DiagnosisResult) -> str:
     )
     if not result.known and result.verdict == UNKNOWN:
         told = f"The gap is {micrometres(gap.rms_um)} (rms), the noise floor {floor}."
+    if gap.at_actuators_alone:
+        each = [f"{name} errs by {brief(own.rms)} {own.unit} (rms)" for name, own in gap.actuators.items()]
+        told = f"No error moves the tip: {listed(each)}."
     known = [each.label for each in result.known]
     if result.verdict == "none":
         return (

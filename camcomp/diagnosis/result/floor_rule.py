@@ -14,7 +14,7 @@ def within_floor(result: DiagnosisResult, *, in_forces: bool = False) -> Diagnos
     """
     floor, unseen, actuators = result.gap.noise_floor_um, result.shrinkage, result.gap.actuators.values()
     in_positions = not actuators or any(each.rms > each.floor for each in actuators)
-    if floor is None or result.verdict == "none" or not in_positions:
+    if floor is None or result.verdict == "none" or not in_positions or result.gap.at_actuators_alone:
         return result
     if result.gap.rms_um <= floor:
         return _without_gap(result)

@@ -60,6 +60,11 @@ class GapSize(Result):
         noise = None if floor is None else round(floor, 3)
         return cls(rms_um=rms, p95_um=p95, max_um=most, noise_floor_um=noise, **more)
 
+    @property
+    def at_actuators_alone(self) -> bool:
+        """Whether no error of an actuator moves the tip, as where it lies on the axis of the last hinge of an arm."""
+        return self.noise_floor_um == 0.0 and bool(self.actuators)
+
 
 class LineShare(Result):
     """A source line of a run with a gap above the noise."""
