@@ -21,18 +21,13 @@ from camcomp.diagnosis.axis.gate import KNOWN, LOCAL
 from camcomp.diagnosis.axis.linear_sets import (
     CAUSES,
     PASSES,
+    LinearChannel,
     LinearFit,
-    by_term,
     covariate_ranges,
-    explained,
-    joint_columns,
     jointly,
-    noise_of_rows,
     refined_shapes,
-    residuals,
     scanned,
     settled,
-    with_misfit,
 )
 from camcomp.diagnosis.axis.row_noise import noise_after_fit
 from camcomp.diagnosis.model.calibration import calibration_of
@@ -76,21 +71,6 @@ class ChannelFit:
         return Estimate.stated(value, value - half, value + half)
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """The most probable set of causes under a prior of the healthy sizes; sd: deviation of a row that counts as one."""
-
-    data: ChannelData
-    terms: Sequence[AxisCause]
-    linear: LinearFit
-    sd: float
-
-    def log_evidence(self, sd: float) -> float:
-        """Log evidence of the set where it stands, with another deviation of a row."""
-        amount, members = by_term(self.linear.found.amplitudes()[0], self.terms), self.linear.found.members
-        return settled(self.data, self.terms, amount, on=members, sd=sd).found.log_evidence
-
-
 def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     """The most probable causes of a channel, their sizes and the residual.
 
@@ -102,82 +82,62 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     if ACCELERATION in large:
         minor = _most_probable(replace(data, minor=frozenset({ACCELERATION})), terms)
         sd = min(free.sd, minor.sd)
-        at_floor = _excess(minor.terms, minor.linear) <= data.floor**2
-        if at_floor or free.log_evidence(sd) + prior_of_covariate(free.linear.model) < minor.log_evidence(sd):
+        values = [fit.settled(sd).found.log_evidence for fit in (free, minor)]
+        if minor.excess <= data.floor**2 or values[0] + prior_of_covariate(free.model) < values[1]:
             free, large = minor, {kind: own for kind, own in _large(minor).items() if kind != ACCELERATION}
     return replace(_answer(free), unmodelled=large)
 
 
-def _large(fit: _Fit) -> dict[str, tuple[float, float]]:
+def _large(fit: LinearFit) -> dict[str, tuple[float, float]]:
     """Kinds of healthy sizes that are more than minor: share of the channel's energy, and log odds that they are."""
     data = fit.data
     out: dict[str, tuple[float, float]] = {}
-    sizes = residuals(fit.terms, fit.linear)[2]
+    sizes = fit.residuals()[2]
     whole = float(np.mean(np.concatenate([data.values[k] for k in data.train]) ** 2))
     for kind in (each for each in BEYOND if each in sizes):
         square = float(np.mean(np.concatenate([data.healthy[k][kind] @ sizes[kind] for k in data.train]) ** 2))
         if square > data.minor_size(kind) ** 2:
             minor = replace(fit, data=replace(data, minor=data.minor | {kind}))
-            gain = fit.log_evidence(fit.sd) - minor.log_evidence(fit.sd) + prior_of_covariate(fit.linear.model)
+            values = [each.settled(fit.sd).found.log_evidence for each in (fit, minor)]
+            gain = values[0] - values[1] + prior_of_covariate(fit.model)
             out |= {kind: (min(square / whole, 1.0), gain)} if gain > 0.0 else {}
     return out
 
 
-def _most_probable(data: ChannelData, terms: Sequence[AxisCause]) -> _Fit:
+def _most_probable(data: ChannelData, terms: Sequence[AxisCause]) -> LinearFit:
+    """The most probable set of causes, with shapes and healthy sizes where it stands."""
     at = [np.zeros(len(t.parameters)) for t in terms]
     for again in range(PASSES + 1):
-        data = data.where(terms, at)
-        responses = [joint_columns(data, terms, k, at) for k in range(len(data.values))]
-        data = with_misfit(data, responses)
-        sd = noise_of_rows(data, responses)
-        linear = explained(data, terms, responses, sd)
-        members = linear.found.members
-        amount = by_term(linear.found.amplitudes()[0], terms)
-        moved = [amount[i] if i in members else np.zeros(len(t.parameters)) for i, t in enumerate(terms)]
-        same = all(np.allclose(a, b, rtol=1e-3, atol=1e-6) for a, b in zip(at, moved, strict=True))
+        here = LinearChannel.at(data, terms, at).with_misfit()
+        fit = here.explained(here.noise)
+        same = all(np.allclose(a, b, rtol=1e-3, atol=1e-6) for a, b in zip(at, fit.amounts, strict=True))
         late = data.clock > 0.0 and again == 0  # rows may be late without any cause, too
-        if again == PASSES or (not late and (same or not members)):
+        if again == PASSES or (not late and (same or not fit.members)):
             break
-        left, _, sizes = residuals(terms, linear)
-        data = data.refined(left, sizes)
-        terms, at = refined_shapes(data, terms, members, moved, sd)
-    if data.channel == "following" and _excess(terms, linear) > LOCAL * data.floor**2:
-        terms, linear, sd = _among_every_set(data, terms)
-        data = linear.data
-    terms, linear = _without_needless_parameters(data, terms, linear, sd)
-    return _Fit(data, *_without_needless(data, terms, linear, sd), sd)
+        left, _, sizes = fit.residuals()
+        data = fit.data.refined(left, sizes)
+        terms, at = refined_shapes(data, terms, fit.members, fit.amounts, fit.sd)
+    if data.channel == "following" and fit.excess > LOCAL * data.floor**2:
+        fit = _among_every_set(fit)
+    return _without_needless(_without_needless_parameters(fit))
 
 
-def _excess(terms: Sequence[AxisCause], linear: LinearFit) -> float:
-    """Mean square of what causes and healthy sizes, but for those that are minor, leave of the fitted runs, each row over its
-    noise.
-    """
-    data, (left, _, sizes) = linear.data, residuals(terms, linear, small=False)
-    left = [y + sum(data.healthy[k][kind] @ sizes[kind] for kind in data.minor) for k, y in enumerate(left)]
-    return float(np.mean(data.in_floors(dict(enumerate(left))) ** 2))
-
-
-def _among_every_set(data: ChannelData, terms: Sequence[AxisCause]) -> tuple[Sequence[AxisCause], LinearFit, float]:
+def _among_every_set(fit: LinearFit) -> LinearFit:
     """The most probable of all sets of causes of a loop, each with its own shapes and made linear where it stands.
 
-    Loops of one axis are much alike as long as they are linear, so that steps from one set do not lead to every other. With the
-    deviation of a row that the best of them leaves.
+    Loops of one axis are much alike as long as they are linear, so that steps from one set do not lead to every other. The
+    deviation of a row is that which the best of them leaves.
     """
-    fits = {}
+    data, terms, every = fit.data, fit.terms, {}
     for on in sets_of_places([t.place for t in terms], CAUSES):
         at = [np.zeros(len(t.parameters)) for t in terms]
-        linear, by = settled(data, terms, at, on=on, sd=data.floor, passes=1), [*terms]
-        amount = by_term(linear.found.amplitudes()[0], terms)
+        amount, by = settled(data, terms, at, on=on, sd=data.floor, passes=1).amounts, [*terms]
         at = [_begun(terms[i], amount[i]) if i in on else each for i, each in enumerate(at)]
         for _ in range(ROUNDS):
             by, at = refined_shapes(data.where(by, at), by, on, at, data.floor)
-        here = data.where(by, at)
-        responses = [joint_columns(here, by, k, at) for k in range(len(data.values))]
-        fits[on] = by, here, responses, noise_of_rows(here, responses)
-    sd = min(noise for *_, noise in fits.values())
-    linear_of = {on: explained(here, by, responses, sd, on) for on, (by, here, responses, _) in fits.items()}
-    best = max(fits, key=lambda on: _value(linear_of[on]))
-    return fits[best][0], linear_of[best], sd
+        every[on] = LinearChannel.at(data, by, at)
+    sd = min(each.noise for each in every.values())
+    return max((each.explained(sd, on) for on, each in every.items()), key=lambda found: found.value)
 
 
 def _begun(term: AxisCause, amount: Floats) -> Floats:
@@ -186,54 +146,34 @@ def _begun(term: AxisCause, amount: Floats) -> Floats:
     return np.array(term.steps) if wrong and term.steps else amount
 
 
-def _value(fit: LinearFit) -> float:
-    """Log evidence of a fit, with a function of one covariate where that adds to it."""
-    found = fit.found
-    gains = gains_of_more(fit.model, found.background, found.members)
-    return float(found.log_evidence + max(0.0, *gains.values()))
-
-
-def _without_needless(
-    data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit, sd: float
-) -> tuple[Sequence[AxisCause], LinearFit]:
+def _without_needless(fit: LinearFit) -> LinearFit:
     """The fit without causes that the others, or a function of one covariate, explain as well.
 
     Sets are made linear where they stand. A cause goes, too, where it is as large as on every healthy machine.
     """
-    while linear.found.members:
-        own = [terms[i] for i in linear.found.members]
-        amount = by_term(linear.found.amplitudes()[0], terms)
-        at = [amount[i] for i in linear.found.members]
-        every = tuple(range(len(own)))
+    while fit.members:
+        terms, at = fit.acting
+        every = tuple(range(len(terms)))
         sets = [every, *(tuple(i for i in every if i != out) for out in every)]
-        fits = {on: settled(data, own, at, on=on, sd=sd) for on in sets}
-        value = {on: _value(fit) for on, fit in fits.items()}
-        best = max(sets[1:], key=lambda on: value[on])
-        more = _excess(own, fits[best]) - _excess(own, fits[every])
-        if value[best] < value[every] and more > (MINOR * data.floor) ** 2:
+        whole, *less = (settled(fit.data, terms, at, on=on, sd=fit.sd) for on in sets)
+        best = max(less, key=lambda found: found.value)
+        if best.value < whole.value and best.excess - whole.excess > (MINOR * fit.data.floor) ** 2:
             break
-        terms, linear = own, fits[best]
-    return terms, linear
+        fit = best
+    return fit
 
 
-def _without_needless_parameters(
-    data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit, sd: float
-) -> tuple[Sequence[AxisCause], LinearFit]:
+def _without_needless_parameters(fit: LinearFit) -> LinearFit:
     """The fit with the causes of fewer parameters that are more probable where they stand, as the linear ones did not show."""
-    every = tuple(range(len(linear.found.members)))
-    by, fit = terms, linear
-    while True:
-        amount, own = by_term(fit.found.amplitudes()[0], by), [by[i] for i in fit.found.members]
-        at = [amount[i] for i in fit.found.members]
-        options = _with_fewer_parameters(own, at, terms)
-        if not options:
-            return by, fit
-        shaped = [(own, at), *(refined_shapes(data, less, every, begun, sd) for less, begun in options)]
-        fits = [settled(data, each, begun, on=every, sd=sd) for each, begun in shaped]
-        best = max(range(len(fits)), key=lambda k: fits[k].found.log_evidence)
-        if best == 0:
-            return by, fit
-        by, fit = shaped[best][0], fits[best]
+    every, candidates = tuple(range(len(fit.members))), fit.terms
+    while options := _with_fewer_parameters(*fit.acting, candidates):
+        shaped = [refined_shapes(fit.data, terms, every, at, fit.sd) for terms, at in options]
+        fits = [settled(fit.data, *each, on=every, sd=fit.sd) for each in (fit.acting, *shaped)]
+        best = max(fits, key=lambda found: found.found.log_evidence)
+        if best is fits[0]:
+            break
+        fit = best
+    return fit
 
 
 def _with_fewer_parameters(
@@ -252,22 +192,21 @@ def _with_fewer_parameters(
     return list(out.values())
 
 
-def _answer(fit: _Fit) -> ChannelFit:
-    terms, linear, sd = fit.terms, fit.linear, fit.sd
-    data, found, model = linear.data, linear.found, linear.model
-    deviation = by_term(np.sqrt(np.diag(found.amplitudes()[1])), terms)
+def _answer(fit: LinearFit) -> ChannelFit:
+    data, found, model = fit.data, fit.found, fit.model
+    deviation = fit.by_term(np.sqrt(np.diag(found.amplitudes()[1])))
     at = model.posterior(found.background, found.data.slab(found.members))
-    slots = {kind: np.arange(model.layout.size)[model.layout.covariates[kind]] for kind in linear.unit}
-    every, units = np.concatenate([*slots.values()]), np.concatenate([*linear.unit.values()])
+    slots = {kind: np.arange(model.layout.size)[model.layout.covariates[kind]] for kind in fit.unit}
+    every, units = np.concatenate([*slots.values()]), np.concatenate([*fit.unit.values()])
     among = at.covariance(every.tolist()) * np.outer(units, units)
-    left, amount, sizes = residuals(terms, linear)
-    spreads = _spreads_of_shapes(data, terms, linear, amount, sd)
+    left, amount, sizes = fit.residuals()
+    spreads = _spreads_of_shapes(fit)
     scale = calibration_of("axes")
     causes, acting, imitated, train = [], [], [], [left[k] for k in data.train]
-    gains = _gains_of_functions(data, linear, left, sd)
+    gains = _gains_of_functions(fit, left)
     whole = sum(float(np.sum((data.values[k] - data.level) ** 2)) for k in data.train)
     for i in found.members:
-        term = terms[i]
+        term = fit.terms[i]
         own = [data.response(k, [(term, amount[i])]) for k in data.train]
         if float(np.mean(np.concatenate(own) ** 2)) < (MINOR * data.floor) ** 2:
             continue  # as large as on every healthy machine
@@ -275,11 +214,7 @@ def _answer(fit: _Fit) -> ChannelFit:
         rest = sum(float(np.sum(left[k] ** 2)) for k in data.train)
         half = 1.96 * scale.interval * deviation[i] + KNOWN * np.abs(amount[i])
         acting.append((term, amount[i]))
-        imitated.append(
-            _no_imitation(
-                data, terms, linear, i, effect=np.concatenate(own), left=np.concatenate(train), gains=gains[1], sd=sd
-            )
-        )
+        imitated.append(_no_imitation(fit, i, effect=np.concatenate(own), left=np.concatenate(train), gains=gains[1]))
         causes.append(
             FoundCause(
                 effect=term.effect, target=term.target,
@@ -288,37 +223,28 @@ def _answer(fit: _Fit) -> ChannelFit:
                 parameters=_parameters(term, amount[i], half, spreads.get(i, {})),
             )
         )  # fmt: skip
-    drivers, hints = ({n: _share_of(linear, n, train, sd) for n, gain in each.items() if gain > 0.0} for each in gains)
+    drivers, hints = ({n: _share_of(fit, n, train) for n, gain in each.items() if gain > 0.0} for each in gains)
     return ChannelFit(
         causes=tuple(causes), acting=tuple(acting), sizes=sizes, covariance=among, left=left, drivers=drivers,
-        hints=hints, columns=_design(linear), imitated=tuple(imitated),
+        hints=hints, columns=_design(fit), imitated=tuple(imitated),
     )  # fmt: skip
 
 
-def _no_imitation(
-    data: ChannelData,
-    terms: Sequence[AxisCause],
-    linear: LinearFit,
-    i: int,
-    *,
-    effect: Floats,
-    left: Floats,
-    gains: Mapping[str, float],
-    sd: float,
-) -> float:
+def _no_imitation(fit: LinearFit, i: int, *, effect: Floats, left: Floats, gains: Mapping[str, float]) -> float:
     """Probability of a member with an effect (n,), where the excess of the residual (n,) over the floor is unmodelled for
     certain.
     """
-    found, term = linear.found, terms[i]
+    found, term, floor = fit.found, fit.terms[i], fit.data.floor
     others = tuple(j for j in found.members if j != i)
     alike = 1.0 if term.run else term.ways  # shapes of one cause, but windows, are imitated together
-    design = _design(linear, i)
+    design = _design(fit, i)
     functions = {
-        name: (gains.get(name, 0.0), products_across(effect, design, own, sd)) for name, own in _functions(data).items()
+        name: (gains.get(name, 0.0), products_across(effect, design, own, fit.sd))
+        for name, own in _functions(fit.data).items()
     }
     return probability_with_unmodelled(
         float(np.sqrt(np.mean(effect**2))), functions, rows=len(effect),
-        excess=float(np.sqrt(max(float(np.mean(left**2)) - data.floor**2, 0.0))), floor=data.floor,
+        excess=float(np.sqrt(max(float(np.mean(left**2)) - floor**2, 0.0))), floor=floor,
         odds=found.data.prior(found.members) - found.data.prior(others) + float(np.log(alike)),
     )  # fmt: skip
 
@@ -331,41 +257,38 @@ def _functions(data: ChannelData) -> dict[str, Floats]:
     }
 
 
-def _design(linear: LinearFit, without: int | None = None) -> Floats:
+def _design(fit: LinearFit, without: int | None = None) -> Floats:
     """Columns (n, k) of the causes that act, but for one, and of healthy sizes, in all rows that were fitted, per standard
     deviation of their amplitudes before the data.
     """
-    model, slab = linear.model, linear.found.data.slab(linear.found.members)
-    slots = [j for kind in linear.unit for j in range(*model.layout.covariates[kind].indices(model.layout.size))]
-    members = (i for i in linear.found.members if i != without)
-    on = [*(j for i in members for j in model.candidates[i].columns), *slots]
+    model, slab = fit.model, fit.found.data.slab(fit.members)
+    slots = [j for kind in fit.unit for j in range(*model.layout.covariates[kind].indices(model.layout.size))]
+    on = [*(j for i in fit.members if i != without for j in model.candidates[i].columns), *slots]
     width = np.array([slab.get(j, 1.0) for j in on])
     return np.asarray(np.concatenate([model.layout.design(g)[:, 0, on] for g in model.groups]) * width, float)
 
 
-def _gains_of_functions(
-    data: ChannelData, linear: LinearFit, left: Sequence[Floats], sd: float
-) -> tuple[dict[str, float], dict[str, float]]:
+def _gains_of_functions(fit: LinearFit, left: Sequence[Floats]) -> tuple[dict[str, float], dict[str, float]]:
     """Log Bayes factor of a function of every covariate for the residual (n,), priors included, and the same where the
     noise is what these functions leave.
     """
-    found, model = linear.found, linear.model
+    data, found = fit.data, fit.found
     y, light = (data.in_floors(dict(enumerate(each))) for each in (left, [np.ones(len(own)) for own in left]))
     B = np.hstack([np.zeros((len(y), 0)), *_functions(data).values()]) * light[:, None]
     rest = noise_after_fit(B, y, data.floor)
     out = []
-    for factor in (1.0, min(rest / sd, 1.0)):
+    for factor in (1.0, min(rest / fit.sd, 1.0)):
         best: dict[str, float] = {}
-        for b, gain in gains_of_more(model, replace(found.background, noise=factor), found.members).items():
+        for b, gain in gains_of_more(fit.model, replace(found.background, noise=factor), found.members).items():
             if b.scales:
                 best[b.scales[-1][0]] = max(gain, best.get(b.scales[-1][0], -np.inf))
         out.append(best)
     return out[0], out[1]
 
 
-def _share_of(linear: LinearFit, name: str, left: Sequence[Floats], sd: float) -> float:
+def _share_of(fit: LinearFit, name: str, left: Sequence[Floats]) -> float:
     """Share of the energy of residuals (n,) that functions of a covariate take."""
-    B = np.concatenate([g.B[name][:, 0, :] for g in linear.model.groups]) / sd
+    B = np.concatenate([g.B[name][:, 0, :] for g in fit.model.groups]) / fit.sd
     y = np.concatenate(list(left))
     c = np.linalg.lstsq(B, y, rcond=1e-9)[0]
     return float(np.clip(1.0 - np.sum((y - B @ c) ** 2) / max(float(np.sum(y**2)), 1e-300), 0.0, 1.0))
@@ -396,18 +319,15 @@ def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[
     return out
 
 
-def _spreads_of_shapes(
-    data: ChannelData, terms: Sequence[AxisCause], linear: LinearFit, amount: Sequence[Floats], sd: float
-) -> dict[int, dict[str, float]]:
+def _spreads_of_shapes(fit: LinearFit) -> dict[int, dict[str, float]]:
     """Standard deviations of logarithms of shapes by term; a length is not known better than the positions of rows."""
-    members = linear.found.members
-    names = scanned(terms, members)
-    out: dict[int, dict[str, float]] = {}
+    data, members, out = fit.data, fit.members, dict[int, dict[str, float]]()
+    names = scanned(fit.terms, members)
     if names:
-        _, spread = jointly(data, terms, members, amount, sd, settings=True)
-        first = sum(len(amount[i]) for i in members)
+        _, spread = jointly(data, fit.terms, members, fit.amounts, fit.sd, settings=True)
+        first = sum(len(fit.amounts[i]) for i in members)
         for (i, name), own in zip(names, spread[first:].tolist(), strict=False):
-            length = any(p.name == name and p.unit in ("mm", "rad") for p in terms[i].module.PARAMETERS)
-            apart = length * data.scatter / (lever_mm(data.hinge) * terms[i].shape[name])
+            length = any(p.name == name and p.unit in ("mm", "rad") for p in fit.terms[i].module.PARAMETERS)
+            apart = length * data.scatter / (lever_mm(data.hinge) * fit.terms[i].shape[name])
             out.setdefault(i, {})[name] = float(np.hypot(own, apart))
     return out

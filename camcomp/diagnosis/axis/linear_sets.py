@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from camcomp.diagnosis.axis.channel_data import ChannelData, shrunk
 from camcomp.diagnosis.axis.effect_columns import AxisCause
 from camcomp.diagnosis.axis.row_noise import left_of_fit, noise_after_fit
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
-from camcomp.diagnosis.model.discrepancy import covariate_columns, smooth_functions
-from camcomp.diagnosis.model.evidence import Background, LinearModel
+from camcomp.diagnosis.model.discrepancy import covariate_columns, gains_of_more, smooth_functions
+from camcomp.diagnosis.model.evidence import Background, LinearModel, Members
 from camcomp.diagnosis.model.explain import Explanation, posterior_of
 from camcomp.diagnosis.model.group import Group
 from camcomp.diagnosis.model.search import search_sets
@@ -30,15 +31,147 @@ SHAPE_SD = 1.5  # of the logarithm of a shape: scans of shapes span four
 
 
 @dataclass(frozen=True, eq=False)
-class LinearFit:
-    """Posterior over sets of causes of a channel where they are made linear, and channel units per amplitude of its healthy
-    columns (q,), by kind.
+class LinearChannel:
+    """A channel made linear at amplitudes of its causes: columns (n, k) of all terms and the error of their tangents at 0 (n,),
+    per run.
     """
 
     data: ChannelData
-    model: LinearModel
+    terms: Sequence[AxisCause]
+    responses: Sequence[tuple[Floats, Floats]]
+
+    @staticmethod
+    def at(data: ChannelData, terms: Sequence[AxisCause], at: Sequence[Floats]) -> LinearChannel:
+        """The channel at amplitudes (d,) of all terms."""
+        here = data.where(terms, at)
+        return LinearChannel(here, terms, [joint_columns(here, terms, k, at) for k in range(len(data.values))])
+
+    def with_misfit(self) -> LinearChannel:
+        """The channel with the misfit that all columns leave."""
+        return replace(self, data=self.data.with_misfit(left_of_fit(*self._columns)))
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a row that counts as one of its own, from residuals jointly with all columns.
+
+        Rows that are correlated count for less: the variance is that of a row times the rows that count as one.
+        """
+        return noise_after_fit(*self._columns, self.data.floor)
+
+    @property
+    def _columns(self) -> tuple[Floats, Floats]:
+        data = self.data
+        A = data.in_floors({k: np.hstack((self.responses[k][0], data.healthy_columns(k))) for k in data.train})
+        return A, data.in_floors({k: data.values[k] - self.responses[k][1] for k in data.train})
+
+    def explained(self, sd: float, on: Members | None = None) -> LinearFit:
+        """The posterior over sets of causes; on: this set alone."""
+        data = self.data
+        unit, ends = data.scales, covariate_ranges(data)
+        groups = []
+        for k in data.train:
+            A, offset = self.responses[k]
+            y = (data.values[k] - offset)[:, None]
+            n = len(y)
+            white = {kind: (own * unit[kind])[:, None] for kind, own in data.healthy[k].items()}
+            smooth = {
+                name: covariate_columns(smooth_functions(own, *ends[name]), np.full((n, 1, 1), sd))
+                for name, own in data.covariates[k].items() if name in ends
+            }  # fmt: skip
+            groups.append(
+                Group(
+                    name=str(k), label="axis", y=y, A=A[:, None], N=np.zeros((n, 1, 0)),
+                    sd=sd * data.noise(k)[:, None], B={**white, **smooth},
+                )
+            )  # fmt: skip
+        start, placed = 0, []
+        for term in self.terms:
+            columns = tuple(range(start, start := start + len(term.parameters)))
+            placed.append(PlacedCause(*term.place, columns, term.ways))
+        bounds = AmplitudeBounds.of(
+            [p for t in self.terms for p in t.parameters], [bool(t.shape) for t in self.terms for _ in t.parameters]
+        )
+        model = LinearModel(
+            groups=tuple(groups), candidates=tuple(placed), bounds=bounds, healthy=dict.fromkeys(unit, 1.0),
+            floors=sd / data.floor,
+        )  # fmt: skip
+        data_of = model.reduced(Background())
+        values = search_sets(data_of, CAUSES) if on is None else {on: max(data_of.value(on), -1e300)}
+        found = posterior_of(model, {Background(): values})
+        return LinearFit(data=data, terms=self.terms, found=found, unit=unit, sd=sd)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LinearFit:
+    """Posterior over sets of causes of a channel where they are made linear.
+
+    unit: channel units per amplitude of its healthy columns (q,), by kind. sd: deviation of a row that counts as one.
+    """
+
+    data: ChannelData
+    terms: Sequence[AxisCause]
     found: Explanation
     unit: Mapping[str, Floats]
+    sd: float
+
+    @property
+    def members(self) -> Members:
+        """Numbers of the causes that act."""
+        return self.found.members
+
+    @property
+    def model(self) -> LinearModel:
+        """The linear model."""
+        return self.found.model
+
+    @cached_property
+    def amounts(self) -> list[Floats]:
+        """Amplitudes (d,) of all terms, 0 of those that do not act."""
+        return self.by_term(self.found.amplitudes()[0])
+
+    @property
+    def acting(self) -> tuple[list[AxisCause], list[Floats]]:
+        """Causes that act, and their amplitudes (d,)."""
+        return [self.terms[i] for i in self.members], [self.amounts[i] for i in self.members]
+
+    def by_term(self, values: Floats) -> list[Floats]:
+        """Values of all effect columns, and perhaps of others behind them, as those of every term (d,)."""
+        return np.split(values, np.cumsum([len(t.parameters) for t in self.terms]))[: len(self.terms)]
+
+    def settled(self, sd: float) -> LinearFit:
+        """The fit of the same set where it stands, with another deviation of a row."""
+        return settled(self.data, self.terms, self.amounts, on=self.members, sd=sd)
+
+    @cached_property
+    def value(self) -> float:
+        """Log evidence, with a function of one covariate where that adds to it."""
+        gains = gains_of_more(self.model, self.found.background, self.members)
+        return float(self.found.log_evidence + max(0.0, *gains.values()))
+
+    @cached_property
+    def excess(self) -> float:
+        """Mean square of what causes and healthy sizes, but for those that are minor, leave of the fitted runs, each row over its
+        noise.
+        """
+        data, (left, _, sizes) = self.data, self.residuals(small=False)
+        left = [y + sum(data.healthy[k][kind] @ sizes[kind] for kind in data.minor) for k, y in enumerate(left)]
+        return float(np.mean(data.in_floors(dict(enumerate(left))) ** 2))
+
+    def residuals(self, *, small: bool = True) -> tuple[list[Floats], list[Floats], dict[str, Floats]]:
+        """Residuals (n,) per run, amplitudes of all terms, and healthy sizes by kind.
+
+        small: whether causes that do not act have the small errors of a healthy machine.
+        """
+        data, found, model = self.data, self.found, self.model
+        mean = model.posterior(found.background, found.data.slab(self.members)).mean
+        sizes = {kind: unit * mean[model.layout.covariates[kind]] for kind, unit in self.unit.items()}
+        errors = self.by_term(small * mean)
+        amount = [a if i in self.members else errors[i] for i, a in enumerate(self.amounts)]
+        left = []
+        for k, y in enumerate(data.values):
+            part = data.response(k, [(t, a) for t, a in zip(self.terms, amount, strict=True) if a.any()])
+            left.append(y - part - sum((data.healthy[k][kind] @ sizes[kind] for kind in sizes), np.zeros(len(y))))
+        return left, amount, sizes
 
 
 def settled(
@@ -46,20 +179,16 @@ def settled(
     terms: Sequence[AxisCause],
     at: Sequence[Floats],
     *,
-    on: tuple[int, ...],
+    on: Members,
     sd: float,
     passes: int = PASSES,
 ) -> LinearFit:
     """The fit of one set of causes, made linear where it stands."""
     at = [each if i in on else np.zeros(len(each)) for i, each in enumerate(at)]
-    for again in range(passes):
-        here = data.where(terms, at)
-        responses = [joint_columns(here, terms, k, at) for k in range(len(data.values))]
-        linear = explained(here, terms, responses, sd, on)
-        amount = by_term(linear.found.amplitudes()[0], terms)
-        if again < passes - 1:
-            at = [amount[i] if i in on else each for i, each in enumerate(at)]
-    return linear
+    for _ in range(passes):
+        fit = LinearChannel.at(data, terms, at).explained(sd, on)
+        at = fit.amounts
+    return fit
 
 
 def joint_columns(data: ChannelData, terms: Sequence[AxisCause], k: int, at: Sequence[Floats]) -> tuple[Floats, Floats]:
@@ -155,65 +284,6 @@ def misfit(
     return float(np.sum((y - A @ c) ** 2) + sd**2 * np.sum((c / np.maximum(prior, 1e-30)) ** 2))
 
 
-def with_misfit(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> ChannelData:
-    """The data with the misfit that all columns leave."""
-    return data.with_misfit(left_of_fit(*_all_columns(data, responses)))
-
-
-def noise_of_rows(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> float:
-    """Standard deviation of a row that counts as one of its own, from residuals jointly with all columns.
-
-    Rows that are correlated count for less: the variance is that of a row times the rows that count as one.
-    """
-    return noise_after_fit(*_all_columns(data, responses), data.floor)
-
-
-def _all_columns(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
-    A = data.in_floors({k: np.hstack((responses[k][0], data.healthy_columns(k))) for k in data.train})
-    return A, data.in_floors({k: data.values[k] - responses[k][1] for k in data.train})
-
-
-def explained(
-    data: ChannelData, terms: Sequence[AxisCause], responses: Sequence[tuple[Floats, Floats]],
-    sd: float, on: tuple[int, ...] | None = None,
-) -> LinearFit:  # fmt: skip
-    """The posterior over sets of causes made linear; on: this set alone."""
-    unit, ends = data.scales, covariate_ranges(data)
-    groups = []
-    for k in data.train:
-        A, offset = responses[k]
-        y = (data.values[k] - offset)[:, None]
-        n = len(y)
-        white = {kind: (own * unit[kind])[:, None] for kind, own in data.healthy[k].items()}
-        smooth = {
-            name: covariate_columns(smooth_functions(own, *ends[name]), np.full((n, 1, 1), sd))
-            for name, own in data.covariates[k].items() if name in ends
-        }  # fmt: skip
-        groups.append(
-            Group(
-                name=str(k), label="axis", y=y, A=A[:, None], N=np.zeros((n, 1, 0)),
-                sd=sd * data.noise(k)[:, None], B={**white, **smooth},
-            )
-        )  # fmt: skip
-    start, placed = 0, []
-    for term in terms:
-        columns = tuple(range(start, start := start + len(term.parameters)))
-        placed.append(PlacedCause(*term.place, columns, term.ways))
-    bounds = AmplitudeBounds.of(
-        [p for t in terms for p in t.parameters], [bool(t.shape) for t in terms for _ in t.parameters]
-    )
-    model = LinearModel(
-        groups=tuple(groups),
-        candidates=tuple(placed),
-        bounds=bounds,
-        healthy=dict.fromkeys(unit, 1.0),
-        floors=sd / data.floor,
-    )
-    data_of = model.reduced(Background())
-    values = search_sets(data_of, CAUSES) if on is None else {on: max(data_of.value(on), -1e300)}
-    return LinearFit(data, model, posterior_of(model, {Background(): values}), unit)
-
-
 def covariate_ranges(data: ChannelData) -> dict[str, tuple[float, float]]:
     """Range of every covariate that moves in the fitted runs."""
     out = {}
@@ -222,27 +292,3 @@ def covariate_ranges(data: ChannelData) -> dict[str, tuple[float, float]]:
         if np.ptp(values) > 0.0:
             out[name] = float(values.min()), float(values.max())
     return out
-
-
-def by_term(values: Floats, terms: Sequence[AxisCause]) -> list[Floats]:
-    """Values of all effect columns, and perhaps of others behind them, as those of every term (d,)."""
-    return np.split(values, np.cumsum([len(term.parameters) for term in terms]))[: len(terms)]
-
-
-def residuals(
-    terms: Sequence[AxisCause], linear: LinearFit, *, small: bool = True
-) -> tuple[list[Floats], list[Floats], dict[str, Floats]]:
-    """Residuals (n,) per run, amplitudes of all terms, and healthy sizes by kind.
-
-    small: whether causes that do not act have the small errors of a healthy machine.
-    """
-    data, found, model = linear.data, linear.found, linear.model
-    mean = model.posterior(found.background, found.data.slab(found.members)).mean
-    sizes = {kind: unit * mean[model.layout.covariates[kind]] for kind, unit in linear.unit.items()}
-    errors = by_term(small * mean, terms)
-    amount = [a if i in found.members else errors[i] for i, a in enumerate(by_term(found.amplitudes()[0], terms))]
-    left = []
-    for k, y in enumerate(data.values):
-        part = data.response(k, [(t, a) for t, a in zip(terms, amount, strict=True) if a.any()])
-        left.append(y - part - sum((data.healthy[k][kind] @ sizes[kind] for kind in sizes), np.zeros(len(y))))
-    return left, amount, sizes
