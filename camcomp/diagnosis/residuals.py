@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from camcomp.diagnosis.arm.poses import ArmBench
 from camcomp.diagnosis.arm.unseen import acting
-from camcomp.diagnosis.axis.at_tip import lever_mm
+from camcomp.diagnosis.axis.findings import lever_mm
 from camcomp.diagnosis.experiment.open_experiment import columns_of
 from camcomp.diagnosis.fit.bench import Run, thinned
 from camcomp.diagnosis.result.types import DiagnosisResult

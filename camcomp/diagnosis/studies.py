@@ -18,8 +18,7 @@ from camcomp.diagnosis.arm.plausible import check_poses
 from camcomp.diagnosis.arm.poses import Poses, approached
 from camcomp.diagnosis.arm.study import bench_of
 from camcomp.diagnosis.arm.study import studied as study_arm
-from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.findings import AxisRun
+from camcomp.diagnosis.axis.findings import AxisRun, lever_mm
 from camcomp.diagnosis.axis.plausible import check_axes
 from camcomp.diagnosis.axis.study import studied as study_axes
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings

@@ -13,7 +13,7 @@ from camcomp.diagnosis.arm.curves import curve_cause
 from camcomp.diagnosis.arm.linear import BY
 from camcomp.diagnosis.arm.poses import CURVE
 from camcomp.diagnosis.model.calibration import calibration_of
-from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
+from camcomp.diagnosis.model.discrepancy import gains_of_covariates, share_of_covariate
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.folds import REGIONS, without_nuisances
 from camcomp.diagnosis.model.noise import HEALTHY, LEAST_VALUES, MINOR
@@ -157,10 +157,7 @@ def drivers(case: PoseCase, intervals: Sequence[IntervalShare]) -> tuple[Driver,
     """
     found = case.explanation
     plain = Background(found.background.noise, families=found.background.families)
-    gains: dict[str, tuple[float, Background]] = {}
-    for b, gain in gains_of_more(case.model, plain, found.members).items():
-        if len(b.scales) > len(plain.scales) and gain > gains.get(b.scales[-1][0], (-np.inf, b))[0]:
-            gains[b.scales[-1][0]] = gain, b
+    gains = gains_of_covariates(case.model, plain, found.members)
     if not gains:
         return ()
     clear = {name for name, (gain, _) in gains.items() if gain > EQUAL_LOG_ODDS}
@@ -169,11 +166,10 @@ def drivers(case: PoseCase, intervals: Sequence[IntervalShare]) -> tuple[Driver,
         return (Driver(covariate="time", share=round(min(sum(i.share for i in intervals), 1.0), 4)),)
     clear = clear or {max(gains, key=lambda name: gains[name][0])}
     shares: dict[str, float] = {}
-    before = _energy(residuals(case.model, plain, found.members))
     for name in clear & set(gains):
-        after = _energy(residuals(case.model, gains[name][1], found.members, unmodelled=False))
         key = name.split(BY)[0]
-        shares[key] = max(shares.get(key, 0.0), min(max(1.0 - after / max(before, 1e-300), 0.0), 1.0))
+        share = share_of_covariate(case.model, plain, gains[name][1], found.members)
+        shares[key] = max(shares.get(key, 0.0), share)
     if found.background.process is not None and found.background.process.over == "time":
         shares.setdefault("time", max(shares.values(), default=0.0))
     order = sorted(shares, key=lambda name: -shares[name])

@@ -55,10 +55,11 @@ def solve(
     if not own:
         raise ValueError("every run is held out")
     every = [drawn(each) for each in (*own, *held)]
-    bench, shelf, outliers, weights = cleaned(robot, tuple(causes), every, len(own), without)
+    bench, shelf, outliers, rest = cleaned(robot, tuple(causes), every, len(own), without)
+    weights = [huber(each) for each in rest]
     gaps = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
     least = tip_floor(robot, bench.campaigns, gaps, stated, least=True)
-    sd = least.sd if least else noise_of_richest(bench, shelf, weights)
+    sd = least.sd if least else noise_of_richest(shelf, rest[: len(own)], weights)
     with progress.part(0.1, 0.5):
         shelf, found = explained(bench=bench, shelf=shelf, sd=sd, floor=least, weights=weights, without=without)
     floor = least
@@ -89,21 +90,18 @@ def bench_of(robot: Robot, causes: tuple[Cause, ...], runs: Sequence[Poses], hol
 def cleaned(
     robot: Robot, causes: tuple[Cause, ...], campaigns: list[Poses], fitted: int, without: Sequence[str]
 ) -> tuple[ArmBench, Shelf, list[tuple[str, int]], list[Floats]]:
-    """Bench without poses that are outliers of the richest model, and factors (n,) on the noise of rows with large
-    residuals.
-    """
+    """Bench without poses that are outliers of the richest model, and the residuals (n, 3) mm that this model leaves."""
     bench = ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted)
     shelf = Shelf.of(bench.columns(without))
-    left = residuals_of_richest(bench, shelf)
     outliers: list[tuple[str, int]] = []
-    weights = []
-    for k, rest in enumerate(left):
+    left = []
+    for k, rest in enumerate(residuals_of_richest(bench, shelf)):
         poses = campaigns[k]
         far = far_off(np.linalg.norm(rest, axis=1), poses.time)
         outliers += named_rows(poses, far)
         campaigns[k] = poses.take(~far)
-        weights.append(huber(rest[~far]))
-    return ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted), shelf, outliers, weights
+        left.append(rest[~far])
+    return ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted), shelf, outliers, left
 
 
 def huber(left: Floats) -> Floats:
@@ -135,11 +133,10 @@ def residuals_of_richest(bench: ArmBench, shelf: Shelf) -> list[Floats]:
     return left
 
 
-def noise_of_richest(bench: ArmBench, shelf: Shelf, weights: Sequence[Floats]) -> float:
-    """Noise, mm per coordinate, for an experiment that states none: the residual of the richest model per degree of
-    freedom.
+def noise_of_richest(shelf: Shelf, left: Sequence[Floats], weights: Sequence[Floats]) -> float:
+    """Noise, mm per coordinate, for an experiment that states none: the residual (n, 3) of the richest model, over the weights
+    (n,) of poses, per degree of freedom.
     """
-    left = residuals_of_richest(bench, shelf)[: len(bench.own)]
     values = sum(r.size for r in left)
     used = len(shelf.without_shapes().columns) + 9 * len(left)
     square = sum(float(((r / w[:, None]) ** 2).sum()) for r, w in zip(left, weights, strict=False))

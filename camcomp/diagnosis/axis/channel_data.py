@@ -11,7 +11,7 @@ from scipy.stats import norm
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName
 from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.gate import within_a_row
-from camcomp.diagnosis.axis.row_noise import noise_after_fit
+from camcomp.diagnosis.axis.noise_floor import noise_after_fit
 from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.ground.datatypes import Bools, Floats

@@ -14,24 +14,24 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.channel_data import ACCELERATION, BEYOND, ChannelData
 from camcomp.diagnosis.axis.effect_columns import AxisCause
+from camcomp.diagnosis.axis.findings import lever_mm
 from camcomp.diagnosis.axis.gate import KNOWN, LOCAL
 from camcomp.diagnosis.axis.linear_sets import (
     CAUSES,
     PASSES,
     LinearChannel,
     LinearFit,
-    covariate_ranges,
     jointly,
     refined_shapes,
     scanned,
     settled,
 )
-from camcomp.diagnosis.axis.row_noise import noise_after_fit
+from camcomp.diagnosis.axis.noise_floor import noise_after_fit
 from camcomp.diagnosis.model.calibration import calibration_of
-from camcomp.diagnosis.model.discrepancy import gains_of_more, prior_of_covariate, smooth_functions
+from camcomp.diagnosis.model.discrepancy import gains_of_covariates, prior_of_covariate, share_of_covariate
+from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.imitation import probability_with_unmodelled, products_across
 from camcomp.diagnosis.model.noise import MINOR
 from camcomp.diagnosis.model.search import ROUNDS, sets_of_places
@@ -196,14 +196,14 @@ def _answer(fit: LinearFit) -> ChannelFit:
     data, found, model = fit.data, fit.found, fit.model
     deviation = fit.by_term(np.sqrt(np.diag(found.amplitudes()[1])))
     at = model.posterior(found.background, found.data.slab(found.members))
-    slots = {kind: np.arange(model.layout.size)[model.layout.covariates[kind]] for kind in fit.unit}
-    every, units = np.concatenate([*slots.values()]), np.concatenate([*fit.unit.values()])
+    every, units = np.concatenate([fit.slots(kind) for kind in fit.unit]), np.concatenate([*fit.unit.values()])
     among = at.covariance(every.tolist()) * np.outer(units, units)
     left, amount, sizes = fit.residuals()
     spreads = _spreads_of_shapes(fit)
     scale = calibration_of("axes")
     causes, acting, imitated, train = [], [], [], [left[k] for k in data.train]
-    gains = _gains_of_functions(fit, left)
+    excess = float(np.sqrt(max(float(np.mean(np.concatenate(train) ** 2)) - data.floor**2, 0.0)))
+    gains = _drivers(fit, left)
     whole = sum(float(np.sum((data.values[k] - data.level) ** 2)) for k in data.train)
     for i in found.members:
         term = fit.terms[i]
@@ -214,7 +214,7 @@ def _answer(fit: LinearFit) -> ChannelFit:
         rest = sum(float(np.sum(left[k] ** 2)) for k in data.train)
         half = 1.96 * scale.interval * deviation[i] + KNOWN * np.abs(amount[i])
         acting.append((term, amount[i]))
-        imitated.append(_no_imitation(fit, i, effect=np.concatenate(own), left=np.concatenate(train), gains=gains[1]))
+        imitated.append(_no_imitation(fit, i, effect=np.concatenate(own), excess=excess, gains=gains[1]))
         causes.append(
             FoundCause(
                 effect=term.effect, target=term.target,
@@ -223,75 +223,60 @@ def _answer(fit: LinearFit) -> ChannelFit:
                 parameters=_parameters(term, amount[i], half, spreads.get(i, {})),
             )
         )  # fmt: skip
-    drivers, hints = ({n: _share_of(fit, n, train) for n, gain in each.items() if gain > 0.0} for each in gains)
+    drivers, hints = (
+        {
+            n: share_of_covariate(model, found.background, b, found.members)
+            for n, (gain, b) in each.items()
+            if gain > 0.0
+        }
+        for each in gains
+    )
     return ChannelFit(
         causes=tuple(causes), acting=tuple(acting), sizes=sizes, covariance=among, left=left, drivers=drivers,
         hints=hints, columns=_design(fit), imitated=tuple(imitated),
     )  # fmt: skip
 
 
-def _no_imitation(fit: LinearFit, i: int, *, effect: Floats, left: Floats, gains: Mapping[str, float]) -> float:
-    """Probability of a member with an effect (n,), where the excess of the residual (n,) over the floor is unmodelled for
-    certain.
-    """
-    found, term, floor = fit.found, fit.terms[i], fit.data.floor
+def _no_imitation(
+    fit: LinearFit, i: int, *, effect: Floats, excess: float, gains: Mapping[str, tuple[float, Background]]
+) -> float:
+    """Probability of a member with an effect (n,), where an excess residual (rms) over the floor is unmodelled for certain."""
+    found, term = fit.found, fit.terms[i]
     others = tuple(j for j in found.members if j != i)
     alike = 1.0 if term.run else term.ways  # shapes of one cause, but windows, are imitated together
     design = _design(fit, i)
     functions = {
-        name: (gains.get(name, 0.0), products_across(effect, design, own, fit.sd))
-        for name, own in _functions(fit.data).items()
+        name: (gains[name][0], products_across(effect, design, fit.columns(on), fit.sd))
+        for name, on in fit.functions.items()
     }
     return probability_with_unmodelled(
-        float(np.sqrt(np.mean(effect**2))), functions, rows=len(effect),
-        excess=float(np.sqrt(max(float(np.mean(left**2)) - floor**2, 0.0))), floor=floor,
+        float(np.sqrt(np.mean(effect**2))), functions, rows=len(effect), excess=excess, floor=fit.data.floor,
         odds=found.data.prior(found.members) - found.data.prior(others) + float(np.log(alike)),
     )  # fmt: skip
 
 
-def _functions(data: ChannelData) -> dict[str, Floats]:
-    """Functions (n, q) of every covariate in the rows of the fitted runs."""
-    return {
-        name: np.concatenate([smooth_functions(data.covariates[k][name], *ends) for k in data.train])
-        for name, ends in covariate_ranges(data).items()
-    }
-
-
 def _design(fit: LinearFit, without: int | None = None) -> Floats:
-    """Columns (n, k) of the causes that act, but for one, and of healthy sizes, in all rows that were fitted, per standard
-    deviation of their amplitudes before the data.
+    """Columns (n, k) of the causes that act, but for one, and of healthy sizes, per standard deviation of their amplitudes before
+    the data.
     """
-    model, slab = fit.model, fit.found.data.slab(fit.members)
-    slots = [j for kind in fit.unit for j in range(*model.layout.covariates[kind].indices(model.layout.size))]
-    on = [*(j for i in fit.members if i != without for j in model.candidates[i].columns), *slots]
-    width = np.array([slab.get(j, 1.0) for j in on])
-    return np.asarray(np.concatenate([model.layout.design(g)[:, 0, on] for g in model.groups]) * width, float)
+    slab = fit.found.data.slab(fit.members)
+    on = [j for i in fit.members if i != without for j in fit.model.candidates[i].columns]
+    on += [j for kind in fit.unit for j in fit.slots(kind).tolist()]
+    return np.asarray(fit.columns(on) * np.array([slab.get(j, 1.0) for j in on]), float)
 
 
-def _gains_of_functions(fit: LinearFit, left: Sequence[Floats]) -> tuple[dict[str, float], dict[str, float]]:
-    """Log Bayes factor of a function of every covariate for the residual (n,), priors included, and the same where the
-    noise is what these functions leave.
+def _drivers(fit: LinearFit, left: Sequence[Floats]) -> list[dict[str, tuple[float, Background]]]:
+    """Covariates by which residuals (n,) go: log Bayes factors, priors included, and backgrounds; and the same where the noise is
+    what functions of all covariates leave.
     """
-    data, found = fit.data, fit.found
-    y, light = (data.in_floors(dict(enumerate(each))) for each in (left, [np.ones(len(own)) for own in left]))
-    B = np.hstack([np.zeros((len(y), 0)), *_functions(data).values()]) * light[:, None]
-    rest = noise_after_fit(B, y, data.floor)
-    out = []
-    for factor in (1.0, min(rest / fit.sd, 1.0)):
-        best: dict[str, float] = {}
-        for b, gain in gains_of_more(fit.model, replace(found.background, noise=factor), found.members).items():
-            if b.scales:
-                best[b.scales[-1][0]] = max(gain, best.get(b.scales[-1][0], -np.inf))
-        out.append(best)
-    return out[0], out[1]
-
-
-def _share_of(fit: LinearFit, name: str, left: Sequence[Floats]) -> float:
-    """Share of the energy of residuals (n,) that functions of a covariate take."""
-    B = np.concatenate([g.B[name][:, 0, :] for g in fit.model.groups]) / fit.sd
-    y = np.concatenate(list(left))
-    c = np.linalg.lstsq(B, y, rcond=1e-9)[0]
-    return float(np.clip(1.0 - np.sum((y - B @ c) ** 2) / max(float(np.sum(y**2)), 1e-300), 0.0, 1.0))
+    every = np.concatenate([np.zeros(0, int), *fit.functions.values()])
+    B, y = (
+        fit.columns(every) / np.concatenate([g.sd for g in fit.model.groups]),
+        fit.data.in_floors(dict(enumerate(left))),
+    )
+    rest = noise_after_fit(B, y, fit.data.floor)
+    backgrounds = (replace(fit.found.background, noise=factor) for factor in (1.0, min(rest / fit.sd, 1.0)))
+    return [gains_of_covariates(fit.model, each, fit.members) for each in backgrounds]
 
 
 def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[str, float]) -> dict[str, Estimate]:

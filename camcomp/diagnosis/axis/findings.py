@@ -23,12 +23,17 @@ ROWS = 50  # below which a run says nothing
 FIRST_MOVE_MM = 0.2  # after which friction has its sense
 
 
+def lever_mm(revolute: bool) -> float:
+    """Way in mm by which an axis is studied per unit of its coordinate: 1 of a slide, that at the end of an arm of a hinge."""
+    return ARM_LENGTH if revolute else 1.0
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AxisRun:
     """Log of one axis in one run: time (n,) s; setpoint, encoder mm; force N, each (n,), NaN where nothing was logged.
 
     row (n,): of the log, from 1. revolute: a hinge, whose
-    way counts at the end of an arm of 1 m (`at_tip.lever_mm`), in mm and N like that of a slide. started: s, on the clock common to all runs.
+    way counts at the end of an arm of 1 m (`lever_mm`), in mm and N like that of a slide. started: s, on the clock common to all runs.
     seen (n,): rows of which somebody saw how fast the axis was; all, where it is not given. course: times and set-points of the
     whole log, (m,) each, of which these may be some rows. expected (n,): encoder minus set-point by the machine file's effects of
     the control, which are `stated`.

@@ -16,7 +16,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.channel_data import (
     ACCELERATION,
     BETWEEN,
@@ -29,10 +28,10 @@ from camcomp.diagnosis.axis.channel_data import (
 from camcomp.diagnosis.axis.channel_fit import ChannelFit, fit_channel
 from camcomp.diagnosis.axis.disturbance_window import Window, find_window, rising, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.effect_columns import AxisCause, DrivenAxis, candidates
-from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun, ChannelRun
+from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun, ChannelRun, lever_mm
 from camcomp.diagnosis.axis.gate import WITHIN, AxisGate, judge, not_known
 from camcomp.diagnosis.axis.linear_sets import CAUSES
-from camcomp.diagnosis.axis.row_noise import left_of_fit, log_gain
+from camcomp.diagnosis.axis.noise_floor import left_of_fit, log_gain
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.axis.terms import TURNS_MM_PER_S, AxisTravel, ripple
 from camcomp.diagnosis.law.words import law_sum

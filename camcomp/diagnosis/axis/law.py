@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.axis.findings import AxisChannel
-from camcomp.diagnosis.axis.row_noise import log_gain, noise_of
+from camcomp.diagnosis.axis.noise_floor import log_gain, noise_of
 from camcomp.diagnosis.axis.terms import AxisTravel, ripple
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermRows
 from camcomp.diagnosis.law.describe import law_result

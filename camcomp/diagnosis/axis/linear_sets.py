@@ -14,14 +14,14 @@ import numpy as np
 
 from camcomp.diagnosis.axis.channel_data import ChannelData, shrunk
 from camcomp.diagnosis.axis.effect_columns import AxisCause
-from camcomp.diagnosis.axis.row_noise import left_of_fit, noise_after_fit
+from camcomp.diagnosis.axis.noise_floor import left_of_fit, noise_after_fit
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
 from camcomp.diagnosis.model.discrepancy import covariate_columns, gains_of_more, smooth_functions
 from camcomp.diagnosis.model.evidence import Background, LinearModel, Members
 from camcomp.diagnosis.model.explain import Explanation, posterior_of
 from camcomp.diagnosis.model.group import Group
 from camcomp.diagnosis.model.search import search_sets
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 
 STEP = 1e-3  # of an amplitude in scales, for slopes
 PASSES = 3  # in which columns are made linear again where the fit stands
@@ -133,6 +133,21 @@ class LinearFit:
     def acting(self) -> tuple[list[AxisCause], list[Floats]]:
         """Causes that act, and their amplitudes (d,)."""
         return [self.terms[i] for i in self.members], [self.amounts[i] for i in self.members]
+
+    def slots(self, name: str) -> Ints:
+        """Columns of a kind of healthy sizes, or of a covariate."""
+        layout = self.model.layout
+        return np.arange(layout.size)[layout.covariates[name]]
+
+    @property
+    def functions(self) -> dict[str, Ints]:
+        """Columns (q,) of the functions of every covariate."""
+        return {name: self.slots(name) for name in self.model.layout.covariates if name not in self.unit}
+
+    def columns(self, on: Ints | Sequence[int]) -> Floats:
+        """Columns (n, k) of the model in all rows that were fitted."""
+        layout = self.model.layout
+        return np.concatenate([layout.design(g)[:, 0, on] for g in self.model.groups])
 
     def by_term(self, values: Floats) -> list[Floats]:
         """Values of all effect columns, and perhaps of others behind them, as those of every term (d,)."""

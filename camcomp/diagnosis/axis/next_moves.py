@@ -11,8 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from camcomp.diagnosis.axis.at_tip import lever_mm
-from camcomp.diagnosis.axis.findings import AxisFindings, AxisRun
+from camcomp.diagnosis.axis.findings import AxisFindings, AxisRun, lever_mm
 from camcomp.diagnosis.axis.gate import STRETCH_S
 from camcomp.diagnosis.axis.plausible import MIDDLE
 from camcomp.diagnosis.axis.terms import travel

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.axis.at_tip import Errors, lever_mm
 from camcomp.diagnosis.axis.effect_columns import DrivenAxis
-from camcomp.diagnosis.axis.findings import ROWS, AxisRun
+from camcomp.diagnosis.axis.findings import ROWS, AxisRun, lever_mm
 from camcomp.diagnosis.axis.rigid_bodies import torque_columns
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
 from camcomp.diagnosis.fit.measured import Measured
@@ -22,6 +21,8 @@ from camcomp.model.statics.arm import ARM_LENGTH, arm_of
 from camcomp.model.statics.description import Actuator, Robot
 from camcomp.model.statics.hanging import hang, tool_wrench
 from camcomp.model.statics.masses import has_moved_mass, mass_loads
+
+Errors = Mapping[str, tuple[Floats, Floats]]  # by axis: times (n,) s and errors (n,) mm or rad
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 from scipy.signal import savgol_filter
 
-from camcomp.diagnosis.axis.row_noise import left_of_fit
+from camcomp.diagnosis.axis.noise_floor import left_of_fit
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import direction, first_order
 from camcomp.model.seams import Seams

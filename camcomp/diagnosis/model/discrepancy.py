@@ -82,6 +82,26 @@ def gains_of_more(model: LinearModel, background: Background, members: Members) 
     return out
 
 
+def gains_of_covariates(
+    model: LinearModel, background: Background, members: Members
+) -> dict[str, tuple[float, Background]]:
+    """Log Bayes factor, priors included, of every further covariate at its best scale, jointly with a set of causes, and the
+    background with it.
+    """
+    best: dict[str, tuple[float, Background]] = {}
+    for b, gain in gains_of_more(model, background, members).items():
+        if len(b.scales) > len(background.scales) and gain > best.get(b.scales[-1][0], (-np.inf, b))[0]:
+            best[b.scales[-1][0]] = gain, b
+    return best
+
+
+def share_of_covariate(model: LinearModel, background: Background, more: Background, members: Members) -> float:
+    """Share of the energy of the residual jointly with a background that functions take which `more` has in addition."""
+    left = residuals(model, background, members), residuals(model, more, members, unmodelled=False)
+    before, after = (sum(float((r**2).sum()) for r in each) for each in left)
+    return min(max(1.0 - after / max(before, 1e-300), 0.0), 1.0)
+
+
 def gains_at_scales(gram: Floats, moment: Floats, unit: float = 1.0) -> tuple[Floats, Floats]:
     """Log Bayes factors (scales,) of columns with normal equations gram (q, q), moment (q,) at SCALES of `unit`, against
     none, and their amplitudes (q,) at the best of them.

@@ -5,7 +5,7 @@ from math import log10
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.axis.row_noise import log_gain
+from camcomp.diagnosis.axis.noise_floor import log_gain
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 
 
