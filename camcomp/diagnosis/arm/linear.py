@@ -22,7 +22,6 @@ from camcomp.model.statics.arm import joint_lines
 from camcomp.model.statics.hanging import Hung
 
 HARMONICS = (2, 4, 40)  # waves of the curve of a single joint, in as many ways
-FINER = 4  # shapes tried between two of the coarse ones
 BY = " > "  # covariate > joint by whose motion it acts
 DRIFT, DRIFT_FLOORS = "drift", 0.35  # how far a healthy instrument wanders over a campaign, in floors
 STEADY_K = 0.1  # by which a temperature has to change to drive anything
@@ -57,23 +56,6 @@ class Shelf:
     def with_more(self, columns: Sequence[Column], candidates: Sequence[PlacedCause]) -> Shelf:
         """With further columns behind those there are, and their candidates."""
         return Shelf((*self.columns, *columns), (*self.candidates, *candidates))
-
-    def with_finer_shapes(self, members: Sequence[int]) -> Shelf:
-        """With shapes in between those of the candidates of a set and their neighbours, where a shape is one number."""
-        out = self
-        for c in (self.candidates[i] for i in members):
-            shapes = {self.columns[j].shape for j in c.columns}
-            if len(shapes) != 1 or len(next(iter(shapes))) != 1:
-                continue
-            ((name, value, low, high),) = next(iter(shapes))
-            tried = np.concatenate([np.geomspace(low, value, FINER + 1), np.geomspace(value, high, FINER + 1)[1:]])
-            for k in (each for each in range(1, len(tried) - 1) if each != FINER):
-                shape = ((name, float(tried[k]), float(tried[k - 1]), float(tried[k + 1])),)
-                first = len(out.columns)
-                own = tuple(range(first, first + len(c.columns)))
-                more = PlacedCause(*c.place, own, c.ways * (2 * FINER - 1))
-                out = out.with_more([replace(self.columns[j], shape=shape) for j in c.columns], [more])
-        return out
 
     def without_shapes(self) -> Shelf:
         """The columns that need no shape, and waves of single joints."""

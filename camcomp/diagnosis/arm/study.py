@@ -151,9 +151,6 @@ def explained(
     """
     noise = KnownNoise(floor.freedom) if floor else None
     found = relinearised(bench, shelf, sd, noise, weights)
-    finer = shelf.with_finer_shapes(found.members)
-    if len(finer.columns) > len(shelf.columns):
-        shelf, found = finer, relinearised(bench, finer, sd, noise, weights)
     doubtful = found.unknown > 1.0 - EVEN or len(found.members) >= MANY
     if SPELL in without or not (doubtful or noise is None):
         return shelf, found
