@@ -7,12 +7,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.effect import Motion, Parameter
-from camcomp.model.hysteresis import first_order
+from camcomp.model.hysteresis import first_order, inverse_first_order
 
 STAGE = "control"
 TARGET = "either"
+STAYS_BEHIND = True
 PLAIN = "lag of the position loop"
 REMEDY = (
     "raise the gain of the position loop (kv) or switch feed-forward on, the same on all axes; or cut more slowly; "
@@ -32,13 +33,32 @@ def on_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, fl
     if tau == 0.0 or not motion.ordered:
         return position
     aimed = which > 0
-    out = position.copy()
     if tau < 0.0:
-        ahead = motion.time - tau
-        beyond = np.maximum(ahead - motion.time[-1], 0.0)
-        for j in np.flatnonzero(aimed.any(axis=0) if aimed.ndim > 1 else aimed):
-            out[:, j] = np.interp(ahead, motion.time, position[:, j]) + beyond * motion.speed[-1, j]
-        return out
+        return _led(position, motion, aimed, -tau)
+    out = position.copy()
     seams = None if motion.seams is None else motion.seams.of(aimed)
     out[:, aimed] = first_order(position[:, aimed], motion.time, tau, seams)
+    return out
+
+
+def invert_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+    """Set-points (n, m) with encoders at `position`; behind a lead up to what set-points do between two instants."""
+    tau = p["time_constant_ms"] * 1e-3
+    if tau == 0.0 or not motion.ordered:
+        return position
+    aimed = which > 0
+    if tau < 0.0:
+        return _led(position, motion, aimed, tau)
+    out = position.copy()
+    out[:, aimed] = inverse_first_order(position[:, aimed], motion.time, tau)
+    return out
+
+
+def _led(position: Floats, motion: Motion, aimed: Bools, lead: float) -> Floats:
+    """Copy of positions (n, m) with those aimed at where they will be `lead` s later; behind the end at the last speed."""
+    out = position.copy()
+    ahead = motion.time + lead
+    beyond = np.maximum(ahead - motion.time[-1], 0.0)
+    for j in np.flatnonzero(aimed.any(axis=0) if aimed.ndim > 1 else aimed):
+        out[:, j] = np.interp(ahead, motion.time, position[:, j]) + beyond * motion.speed[-1, j]
     return out

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion, Parameter
-from camcomp.model.hysteresis import first_order, second_order
+from camcomp.model.hysteresis import first_order, inverse_second_order, second_order
 from camcomp.model.seams import Seams
 
 STAGE = "control"
@@ -97,4 +97,15 @@ def on_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, fl
     aimed = which > 0
     out = position.copy()
     out[:, aimed] += second_order(position[:, aimed], motion.time, period, p["damping"])
+    return out
+
+
+def invert_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+    """Set-points (n, m) with encoders at `position`."""
+    period = p["period_ms"] * 1e-3
+    if period == 0.0 or not motion.ordered:
+        return position
+    aimed = which > 0
+    out = position.copy()
+    out[:, aimed] = inverse_second_order(position[:, aimed], motion.time, period, p["damping"])
     return out

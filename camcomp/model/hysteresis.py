@@ -8,6 +8,10 @@ from camcomp.ground.compiled import inner, kept
 from camcomp.ground.datatypes import Floats
 from camcomp.model.seams import Seams
 
+AT_ONCE = 1e-6  # of a time constant: shorter time steps move a lag by less than the round-off of its set-points
+REST_S = 60.0  # time step across a stop
+SHORT, SOON, DENSE = 0.01, 0.5, 2.0  # time constants
+BELOW, ABOVE = 5, 2  # diagonals of the equations of a second-order loop
 SAME = 1e-9  # relative difference below which two time steps are equal
 STILL = 1e-9  # mm or rad, round-off of two solutions of the same point
 PRESLIDING_MM = 0.005  # rolling guides reverse their friction within 1 to 20 um (Armstrong-Helouvry 1994)
@@ -56,6 +60,79 @@ def first_order(x: Floats, time: Floats, tau: float, seams: Seams | None = None)
 
 
 @inner
+def _lag_shares(dt, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Shares of the position before, of the set-point before and of the set-point in the position after dt."""
+    decay = np.exp(-dt / tau)
+    hold = -np.expm1(-dt / tau) * tau / dt
+    return decay, hold - decay, 1.0 - hold
+
+
+@inner
+def _speed(y, t, k):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Speed at instant k by a parabola through its neighbours, or from the one before if the motion ends."""
+    dt = t[k] - t[k - 1]
+    before = (y[k] - y[k - 1]) / dt if dt > 0.0 else 0.0
+    after = t[k + 1] - t[k] if k + 1 < t.shape[0] else 0.0
+    if not 0.0 < after < REST_S:
+        return before
+    return before + ((y[k + 1] - y[k]) / after - before) * dt / (dt + after)
+
+
+@inner
+def _later(t, i, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """The instant to whose position a lag is led from instant i: the next but within SOON tau, not in front of a very short step."""
+    k = i
+    while k + 1 < t.shape[0] and t[k + 1] - t[k] < REST_S:
+        since = t[k] - t[i - 1]
+        short = t[k + 1] - t[k] < SHORT * tau and since < 2.0 * SOON * tau
+        if k > i and since >= SOON * tau and not short:
+            break
+        k += 1
+    return k
+
+
+@kept
+def _inverse_first_order(y, t, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
+    n = y.shape[0]
+    x = np.empty_like(y)
+    x[0] = y[0]
+    reached = y[0].copy()
+    for i in range(1, n):
+        dt = t[i] - t[i - 1]
+        if dt <= AT_ONCE * tau:
+            x[i] = x[i - 1] + y[i] - y[i - 1]
+            continue
+        decay, old, new = _lag_shares(dt, tau)
+        k = _later(t, i, tau) if dt < DENSE * tau else i
+        after = t[k] - t[i]
+        for j in range(y.shape[1]):
+            coming = decay * reached[j] + old * x[i - 1, j]
+            if after > AT_ONCE * tau:
+                ahead = min(after, DENSE * tau)
+                decay_ahead, old_ahead, new_ahead = _lag_shares(ahead, tau)
+                share = ahead / after
+                goal = y[i, j] + share * (y[k, j] - y[i, j])
+                then = share * (y[k, j] + tau * _speed(y[:, j], t, k))
+                by = decay_ahead * new + old_ahead + new_ahead * (1.0 - share)
+                x[i, j] = (goal - new_ahead * then - decay_ahead * coming) / by
+            else:
+                x[i, j] = (y[i, j] - coming) / new
+            reached[j] = coming + new * x[i, j]
+    return x
+
+
+def inverse_first_order(y: Floats, time: Floats, tau: float) -> Floats:
+    """Set-points x (n, m) with which a first-order lag of time constant tau s is at y (n, m); time (n,) s, not decreasing.
+
+    At rest at the start. Where instants are at least DENSE tau apart, and where a motion ends, the lag is at y at every one. Led to
+    all of dense ones, set-points would alternate behind each jump of y or its speed: there they lead to y at a later instant, the next
+    one or the first behind SOON tau, from which x = y + tau dy/dt goes on (dead-beat control in two steps).
+    """
+    out: Floats = _inverse_first_order(np.ascontiguousarray(y), np.ascontiguousarray(time), tau)
+    return out
+
+
+@inner
 def _free_swing(w, damping, dt):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Free response of a second-order loop over dt: its state transition matrix (error, rate), four elements."""
     fade, square = damping * w, (damping * damping - 1.0) * w * w
@@ -70,6 +147,19 @@ def _free_swing(w, damping, dt):  # type: ignore[no-untyped-def]  # pragma: no c
     return even + fade * odd, odd, -w * w * odd, even - fade * odd
 
 
+@inner
+def _swing(error, rate, push, bend, free, w, damping, dt):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Error and rate after dt, during which the set-point's acceleration goes straight from `push` to `bend`."""
+    ee, er, re, rr = free
+    # particular solution for a linear acceleration, and the free response about it
+    slope = (bend - push) / dt
+    run = -slope / (w * w)
+    late = 2.0 * damping * slope / w
+    about = error + (push - late) / (w * w)
+    drift = rate - run
+    return ee * about + er * drift - (bend - late) / (w * w), re * about + rr * drift + run
+
+
 @kept
 def _second_order(x, t, period, damping):  # type: ignore[no-untyped-def]  # pragma: no cover
     n = x.shape[0]
@@ -77,8 +167,8 @@ def _second_order(x, t, period, damping):  # type: ignore[no-untyped-def]  # pra
     w = 2.0 * np.pi / period
     push = np.zeros(x.shape[1])
     rate = np.zeros(x.shape[1])
-    known = 0.0  # the time step to which ee, er, re, rr belong
-    ee, er, re, rr = 1.0, 0.0, 0.0, 1.0
+    known = 0.0  # the time step to which `free` belongs
+    free = 1.0, 0.0, 0.0, 1.0
     for i in range(1, n):
         dt = t[i] - t[i - 1]
         if dt <= 0.0:
@@ -87,20 +177,13 @@ def _second_order(x, t, period, damping):  # type: ignore[no-untyped-def]  # pra
             continue
         after = t[i + 1] - t[i] if i + 1 < n else 0.0
         if abs(dt - known) > SAME * dt:
-            ee, er, re, rr = _free_swing(w, damping, dt)
+            free = _free_swing(w, damping, dt)
             known = dt
         for j in range(x.shape[1]):
             bend = 0.0
             if after > 0.0:
                 bend = 2.0 * ((x[i + 1, j] - x[i, j]) / after - (x[i, j] - x[i - 1, j]) / dt) / (dt + after)
-            # particular solution for a linear acceleration, and the free response about it
-            slope = (bend - push[j]) / dt
-            run = -slope / (w * w)
-            late = 2.0 * damping * slope / w
-            error = y[i - 1, j] + (push[j] - late) / (w * w)
-            drift = rate[j] - run
-            y[i, j] = ee * error + er * drift - (bend - late) / (w * w)
-            rate[j] = re * error + rr * drift + run
+            y[i, j], rate[j] = _swing(y[i - 1, j], rate[j], push[j], bend, free, w, damping, dt)
             push[j] = bend
     return y
 
@@ -113,6 +196,64 @@ def second_order(x: Floats, time: Floats, period: float, damping: float) -> Floa
     """
     out: Floats = _second_order(np.ascontiguousarray(x), np.ascontiguousarray(time), period, damping)
     return out
+
+
+@inner
+def _add(bands, row, column, value):  # type: ignore[no-untyped-def]  # pragma: no cover
+    if value != 0.0:
+        bands[ABOVE + row - column, column] += value
+
+
+@kept
+def _inverse_bands(t, period, damping):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Equations of `_second_order` for set-point and rate at n instants: bands (BELOW + ABOVE + 1, 2 n), and the factor (2 n,) of the
+    position before in each of them.
+    """
+    n = t.shape[0]
+    w = 2.0 * np.pi / period
+    bands = np.zeros((BELOW + ABOVE + 1, 2 * n))
+    bands[ABOVE] = 1.0
+    factor = np.zeros(2 * n)
+    pushed = np.zeros(3)  # factors of the set-points around the instant before in its acceleration
+    for i in range(1, n):
+        dt = t[i] - t[i - 1]
+        after = t[i + 1] - t[i] if i + 1 < n else 0.0
+        bent = np.zeros(3)
+        by_error, by_rate, by_push, by_bend = (1.0, 0.0), (0.0, 1.0), (0.0, 0.0), (0.0, 0.0)
+        if dt > 0.0:
+            if after > 0.0:
+                bent[0] = 2.0 / (dt * (dt + after))
+                bent[2] = 2.0 / (after * (dt + after))
+                bent[1] = -bent[0] - bent[2]
+            free = _free_swing(w, damping, dt)
+            by_error = _swing(1.0, 0.0, 0.0, 0.0, free, w, damping, dt)
+            by_rate = _swing(0.0, 1.0, 0.0, 0.0, free, w, damping, dt)
+            by_push = _swing(0.0, 0.0, 1.0, 0.0, free, w, damping, dt)
+            by_bend = _swing(0.0, 0.0, 0.0, 1.0, free, w, damping, dt)
+        for k in range(2):  # the error is position minus set-point, so that its equation has the other sign
+            row, sign = 2 * i + k, 1.0 - 2.0 * k
+            factor[row] = -sign * by_error[k]
+            _add(bands, row, 2 * i - 2, -sign * by_error[k])
+            _add(bands, row, 2 * i - 1, sign * by_rate[k])
+            for j in range(3):
+                _add(bands, row, 2 * (i - 2 + j), sign * by_push[k] * pushed[j])
+                _add(bands, row, 2 * (i - 1 + j), sign * by_bend[k] * bent[j])
+        pushed = bent
+    return bands, factor
+
+
+def inverse_second_order(y: Floats, time: Floats, period: float, damping: float) -> Floats:
+    """Set-points x (n, m) that a second-order loop makes positions y (n, m): x + second_order(x) = y.
+
+    Its acceleration at an instant looks ahead to the next one, so that all instants are solved together.
+    """
+    from scipy.linalg import solve_banded  # only programs on such a loop wait for it
+
+    bands, factor = _inverse_bands(np.ascontiguousarray(time), period, damping)
+    right = factor[:, None] * np.repeat(np.concatenate((y[:1], y[:-1])), 2, axis=0)
+    right[::2] += y
+    found = solve_banded((BELOW, ABOVE), bands, right, overwrite_ab=True, overwrite_b=True, check_finite=False)
+    return np.asarray(found[::2])
 
 
 @kept

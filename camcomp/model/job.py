@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cached_property, partial
 from pathlib import Path as FilePath
 from typing import Any
@@ -129,11 +129,17 @@ class Job:
     @cached_property
     def correctable(self) -> Job:
         """The job with the effects that set-points can correct."""
-        kept = tuple(cause for cause in self.causes if not cause.uncorrectable)
+        return self.with_causes(cause for cause in self.causes if not cause.uncorrectable)
+
+    def with_causes(self, causes: Iterable[Cause]) -> Job:
+        """The job with only these of its effects; itself if those are all."""
+        kept = tuple(causes)
         if len(kept) == len(self.causes):
             return self
         other = replace(self)
-        vars(other)["causes"] = kept
+        vars(other).update(causes=kept, frame=self.frame)
+        if len(signal_path.acting(kept, "structure")) == len(signal_path.acting(self.causes, "structure")):
+            vars(other)["real_machine"] = self.real_machine  # which may answer by interpolation
         return other
 
     @cached_property

@@ -31,6 +31,7 @@ ORDER = (
 STAGES = tuple(stage for stage, _ in ORDER)
 HOOKS = tuple(hook for _, hooks in ORDER for hook in hooks)
 _AT = dict(ORDER)
+INVERSE = "invert_servo"  # of on_servo, for effects that have one
 
 
 def stages_of(effect: Any) -> set[str]:
@@ -59,6 +60,11 @@ def pushes(effect: Any) -> bool:
 def acting(causes: Sequence[Cause], stage: str) -> list[Cause]:
     """The causes with a hook at a stage."""
     return [cause for cause in causes if any(hasattr(cause.effect, hook) for hook in _AT[stage])]
+
+
+def has_inverse(cause: Cause) -> bool:
+    """Whether a cause at the control states its inverse."""
+    return cause.hook(INVERSE) is not None
 
 
 def under_measured_force(causes: Sequence[Cause]) -> tuple[Cause, ...]:
@@ -101,6 +107,14 @@ def controlled(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Moti
             loops.append(cause)
         encoder = behind
     return encoder
+
+
+def set_points_for(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> Floats:
+    """Set-points (n, m) whose encoders are those of a motion, by the inverse of `controlled` for causes that state theirs."""
+    position = motion.encoder
+    for hook, cause in reversed(list(_hooks(causes, INVERSE))):
+        position = hook(position, motion, cause.which(actuators), cause.values)
+    return position
 
 
 def on_top(causes: Sequence[Cause], stated: Sequence[Cause]) -> list[Cause]:

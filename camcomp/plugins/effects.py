@@ -13,7 +13,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import params_of
 from camcomp.model.effect import Axes, Load, Motion, Parameter, Target, nominal
-from camcomp.model.signal_path import STAGES
+from camcomp.model.signal_path import INVERSE, STAGES
 from camcomp.model.statics.description import Robot
 from camcomp.plugins.contract import (
     check_functions,
@@ -33,7 +33,7 @@ from camcomp.plugins.parameters import check_params
 if TYPE_CHECKING:  # the contract does not need the solver
     from camcomp.model.motion.twin import Reading
 
-_ALSO = ("public", "applies", "first_guess", "guess")
+_ALSO = ("public", "applies", "first_guess", "guess", INVERSE)
 _SOME = slice(1, None, 3)  # instants of a trial
 _YAML_KEYS = {"effect", "target", "source"}  # keys of the same mapping as the parameters
 
@@ -56,6 +56,8 @@ class EffectPlugin(Protocol):
     - GEOMETRY: True: an error of the arm's geometry, which absolutely accurate controllers correct themselves.
     - MODELLED_FORCE: True: an error of the force model, which does not change measured forces.
     - COULOMB: names of parameters: Coulomb force at the guide, which holds a carriage within the play of its drive.
+    - `invert_servo`: inverse of on_servo, with its arguments: encoders -> set-points (n, m); compensate leads the commands through it
+      instead of approaching them in many steps. STAYS_BEHIND: True: at constant speed the encoder is not at its set-point.
     - UNCORRECTABLE: True: compensate does not correct its error.
     - Params: Spec of further YAML keys, which are never fitted.
     """
@@ -138,8 +140,10 @@ def checked(name: str, found: Any, who: str) -> ModuleType:
         wrapped["public"] = guarded(who, "public", module.public, partial(_wrong_values, module))
     if hasattr(module, "applies"):
         wrapped["applies"] = guarded(who, "applies", module.applies, _no_answer)
+    inverse = (INVERSE,) if hasattr(module, INVERSE) else ()
+    wrapped |= {each: guarded(who, each, getattr(module, each), partial(_wrong, each)) for each in inverse}
     effect = with_functions(module, wrapped)
-    _try(who, effect, hooks)
+    _try(who, effect, hooks + inverse)
     return effect
 
 

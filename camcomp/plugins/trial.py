@@ -69,6 +69,7 @@ def inputs(robot: Robot, *, whole: bool, named: str | None = None) -> dict[str, 
     names = tuple(each.name for each in robot.actuators)
     return {
         "on_servo": (encoder, motion, which),
+        "invert_servo": (encoder, motion, which),
         "on_drive": (still, motion, which),
         "on_drive_force": (still, motion, which),
         "on_robot": (robot, names if whole else names[:1]),

@@ -210,6 +210,7 @@ BROKEN = {
         ("def on_pose", "def on_posse", "did you mean 'on_pose'"),
         ("def on_pose", "def on_wear(tip, p):\n    return tip\n\n\ndef on_pose", "nothing calls the function 'on_wear'"),
         ("def on_pose", "def _on_pose", "there is no hook"),
+        ("def on_pose", "def invert_servo(position, motion, which, p):\n    return position[0]\n\n\ndef on_pose", "invert_servo"),
         ("(tip, load, motion, p)", "(tip, load, p)", "on_pose(tip, load, p) has to be on_pose(tip, load, motion, p)"),
         ("(tip, load, motion, p)", "(tip, motion, load, p)", "has to be on_pose(tip, load, motion, p)"),
         ("(tip, load, motion, p)", "(tip, load, motion, p, q)", "has to be on_pose"),

@@ -26,9 +26,10 @@ from camcomp.model.cutting.track import lay_track
 from camcomp.model.effect import Cause
 from camcomp.model.job import Job
 from camcomp.model.law.spec import FormulaSpec
-from camcomp.model.motion.response import Travel, respond
+from camcomp.model.motion.response import respond
 from camcomp.model.motion.run_path import path_of_program
 from camcomp.model.motion.timeline import schedule
+from camcomp.model.motion.travel import Travel
 from camcomp.model.motion.twin import twin_of
 from camcomp.model.statics.solve import FREE, solve
 from camcomp.plugins.effects import EffectHooks

@@ -24,9 +24,8 @@ from camcomp.compensation.program.judged_points import (
     see_original,
     whole_pose,
 )
-from camcomp.compensation.program.line_ends import cut_at, cut_at_knots, pieces_between
+from camcomp.compensation.program.line_ends import cut_at, cut_at_knots, cut_at_stops, pieces_between, points_inside
 from camcomp.compensation.program.moves import (
-    WITHIN_RAPID,
     chord_budget,
     corrected_pieces,
     error_goals,
@@ -157,7 +156,7 @@ class _Correction:
             refuse_unfollowed(job, self.method, self.part)
         self.turns = load_turns(job, base)
         turned = cut_at(base, [(i, at) for i, *ends in self.turns for at in ends])
-        track, turning = cut_at_reversals(job, cut_at_knots(job, turned, spacing), spacing)
+        track, turning = cut_at_reversals(job, cut_at_stops(job, cut_at_knots(job, turned, spacing)), spacing)
         self.shares = shares_of(job, base)
         if self.shares is not None:
             track, of = self.shares.divided(self.shares.with_jumps(track))
@@ -205,9 +204,12 @@ class _Correction:
         if asked.orienting is None:
             piece, w, of = without_shared_ends(track, piece, w)
         points = of
-        if self.job.causes:  # drives remember their turns within rapids
-            rapids = np.flatnonzero(self.corrected & (track.path.kind[track.motion] == RAPID) & (track.length > 0.0))
-            between, at = np.repeat(rapids, len(WITHIN_RAPID)), np.tile(WITHIN_RAPID, len(rapids))
+        if self.job.causes:
+            begin = np.where(np.diff(piece, prepend=-1) == 0, np.append(0.0, w[:-1]), 0.0)
+            way = (w - begin) * track.length[piece]
+            rapid = (track.path.kind[track.motion[piece]] == RAPID) & (way > 0.0)
+            node, share = points_inside(self.job, rapid, way)
+            between, at = piece[node], begin[node] + share * (w - begin)[node]
             order = np.lexsort((np.concatenate((w, at)), np.concatenate((piece, between))))
             points = np.argsort(order, kind="stable")[: len(piece)][of]
             piece, w = np.concatenate((piece, between))[order], np.concatenate((w, at))[order]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.compensation.program.corrected_rows import CorrectedRows
-from camcomp.compensation.program.moves import WITHIN_RAPID
+from camcomp.compensation.program.line_ends import points_inside
 from camcomp.compensation.program.orienting import Orienting
 from camcomp.compensation.program.programmed import Programmed
 from camcomp.gcode.output import Rewritten
@@ -16,7 +16,8 @@ from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.records import dataclass, fields, replace
 from camcomp.ground.vectors import largest_of_groups, sizes
 from camcomp.model.job import Job
-from camcomp.model.motion.response import Travel, aim_pose, respond
+from camcomp.model.motion.response import aim_pose, respond
+from camcomp.model.motion.travel import Travel
 from camcomp.model.statics.target import Correction
 
 
@@ -36,10 +37,10 @@ class JudgedPoints:
         start = np.where(begins, 0.0, np.concatenate(([0.0], rows.w[:-1])))
         inner = np.flatnonzero(cut & (track.length[rows.piece] > 0.0))
         bent = inner[rows.bent[inner]]
-        rapid = np.flatnonzero((rows.kind == RAPID) & rows.corrected) if job.causes else inner[:0]
-        row = np.concatenate((np.arange(n), inner, bent, bent, np.repeat(rapid, len(WITHIN_RAPID))))
-        fraction = np.repeat([1.0, 0.5, 0.25, 0.75], [n, len(inner), len(bent), len(bent)])
-        fraction = np.concatenate((fraction, np.tile(WITHIN_RAPID, len(rapid))))
+        way = np.where(cut, (rows.w - start) * track.length[rows.piece], 0.0)
+        many, more = points_inside(job, (rows.kind == RAPID) & rows.corrected, way)
+        row = np.concatenate((np.arange(n), inner, bent, bent, many))
+        fraction = np.concatenate((np.repeat([1.0, 0.5, 0.25, 0.75], [n, len(inner), len(bent), len(bent)]), more))
         order = np.argsort(row + 0.5 * fraction, kind="stable")
         self.row = row = row[order]  # end point that the point belongs to
         self.fraction = fraction = fraction[order]  # of the move to it, 1 at its end

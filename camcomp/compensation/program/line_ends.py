@@ -11,14 +11,17 @@ from collections.abc import Iterable
 import numpy as np
 
 from camcomp.compensation.program.division import COARSE_MM, trial_nodes
-from camcomp.compensation.program.moves import corrected_pieces, travel_of
-from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.compensation.program.moves import WITHIN_RAPID, corrected_pieces, travel_of
+from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
 from camcomp.model.effect import Cause
 from camcomp.model.error_table.table import ErrorTable
 from camcomp.model.job import Job
+from camcomp.model.signal_path import acting
 from camcomp.model.statics.solve import inverse
 
+LOOP_MM = 1.0  # between points at which set-points of long lines are looked at
+LEADING_MM = 5e-4  # of a line that takes up the lag of a loop beside a stop; the tip misses half of that
 LEAST = 1e-6  # of a piece: places nearer to each other or to its ends are one
 
 Place = tuple[int, float]  # piece, fraction of it
@@ -31,6 +34,20 @@ def points_along(track: Track, spacing: float = COARSE_MM) -> tuple[Ints, Floats
     nodes = trial_nodes(track.length, track.angle, corrected & (track.length > 0.0), spacing)
     on = corrected[nodes.piece]
     return nodes.piece[on], nodes.w[on]
+
+
+def points_inside(job: Job, rapid: Bools, way: Floats) -> tuple[Ints, Floats]:
+    """Moves (k,) and fractions (k,), never a half, of points inside moves that matter to those at their ends, in the order of travel.
+
+    Drives remember their turns within rapids (p,); control loops are late by the speed at which actuators arrive, which changes along
+    a straight `way` (p,) mm.
+    """
+    steps = np.where(rapid & bool(job.causes), len(WITHIN_RAPID) + 1, 1)
+    if is_late(job):
+        steps = np.where(rapid, steps, 2 * np.round(0.5 * way / LOOP_MM).astype(np.int64) + 1)
+    move = np.repeat(np.arange(len(steps)), steps - 1)
+    k = np.arange(len(move)) - np.repeat(np.cumsum(steps - 1) - (steps - 1), steps - 1)
+    return move, (k + 1.0) / steps[move]
 
 
 def cut_at(track: Track, places: Iterable[Place]) -> Track:
@@ -82,6 +99,31 @@ def cut_at_knots(job: Job, track: Track, spacing: float) -> Track:
             row, share = _crossings(x - knot, within)
             cuts.update(zip(piece[row].tolist(), (w[row] + share * np.diff(w)[row]).tolist(), strict=True))
     return cut_at(track, cuts)
+
+
+def is_late(job: Job) -> bool:
+    """Whether control loops act on the set-points."""
+    return bool(acting(job.causes, "control"))
+
+
+def cut_at_stops(job: Job, track: Track) -> Track:
+    """The track with a short piece of its own behind and in front of every stop in feed lines, where control loops are late.
+
+    Behind a stop the commanded tip leads the programmed one at once, in front of it no longer.
+    """
+    loops = acting(job.causes, "control")
+    if not (loops and all(getattr(cause.effect, "STAYS_BEHIND", False) for cause in loops)):
+        return track
+    real = np.flatnonzero(track.length > 0.0)
+    begins = np.diff(np.cumsum(track.corner)[real], prepend=0) > 0
+    feed = corrected_pieces(track.path, track) & (track.path.kind[track.motion] != RAPID)
+    able = (feed & (track.length > 4.0 * LEADING_MM))[real]
+    places: list[Place] = []
+    for i in real[begins & able].tolist():
+        places.append((i, max(LEADING_MM / track.length[i], 2.0 * LEAST)))
+    for i in real[np.append(begins[1:], True) & able].tolist():
+        places.append((i, 1.0 - max(LEADING_MM / track.length[i], 2.0 * LEAST)))
+    return cut_at(track, places)
 
 
 def _instants(cause: Cause) -> list[float]:

@@ -15,7 +15,8 @@ from camcomp.ground.records import dataclass
 from camcomp.ground.vectors import chosen
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
-from camcomp.model.motion.response import AROUND_S, Travel
+from camcomp.model.motion.response import AROUND_S
+from camcomp.model.motion.travel import Travel
 from camcomp.model.oriented import platform_rotations
 from camcomp.model.statics.masses import has_moved_mass
 from camcomp.model.statics.solve import STATUS

@@ -18,7 +18,8 @@ from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import largest_of_groups, sizes
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
-from camcomp.model.motion.response import Travel, aim_at, respond, without_drives
+from camcomp.model.motion.response import aim_at, respond, without_drives
+from camcomp.model.motion.travel import Travel
 from camcomp.model.oriented import platform_rotations, platform_words, tilts
 from camcomp.model.statics.rotation import exp_rotation
 from camcomp.model.statics.target import Correction

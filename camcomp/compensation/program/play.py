@@ -27,6 +27,7 @@ from camcomp.model.hysteresis import turning_points
 from camcomp.model.job import Job
 from camcomp.model.motion import response
 from camcomp.model.motion.response import LEAST_MM, way_per_unit
+from camcomp.model.motion.travel import WORDS
 from camcomp.model.signal_path import momentary
 
 STANDING_MM = 2e-4  # way that the carriage should have gone at the end of such a line
@@ -56,7 +57,7 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
     carriage = found.rho * way_per_unit(job)
     lines: set[Span] = set()
     cuts: set[Place] = set()
-    arm = carriage.shape[1] > response.WORDS
+    arm = carriage.shape[1] > WORDS
     for j in np.flatnonzero(memory):
         for k in turning_points(carriage[:, j], LEAST_MM)[0]:
             k += int(k + 1 < len(w) and piece[k + 1] != piece[k])  # it turns round where the next piece starts

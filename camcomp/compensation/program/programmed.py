@@ -13,7 +13,8 @@ from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.records import dataclass
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
-from camcomp.model.motion.response import Travel, aim_at, respond
+from camcomp.model.motion.response import aim_at, respond
+from camcomp.model.motion.travel import Travel
 from camcomp.model.statics.target import Correction
 
 if TYPE_CHECKING:

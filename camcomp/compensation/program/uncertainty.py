@@ -19,7 +19,8 @@ from camcomp.ground.records import dataclass, replace
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.drawn import DrawnJob
 from camcomp.model.job import Job
-from camcomp.model.motion.response import Travel, aim_at, respond
+from camcomp.model.motion.response import aim_at, respond
+from camcomp.model.motion.travel import Travel
 
 SAME_SHARE = 1e-3  # a smaller step of the share is none
 

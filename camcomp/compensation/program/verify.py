@@ -15,6 +15,7 @@ import numpy as np
 from camcomp.compensation.bands.outcome import BandTotals, band_figures
 from camcomp.compensation.bands.tip_field import tip_field_of
 from camcomp.compensation.program.division import trial_nodes
+from camcomp.compensation.program.line_ends import LOOP_MM, cut_at_stops, is_late
 from camcomp.compensation.program.matching import Matching
 from camcomp.compensation.program.moves import (
     WITHIN_RAPID,
@@ -37,7 +38,8 @@ from camcomp.ground.records import dataclass, field, replace
 from camcomp.ground.vectors import largest_of_groups, sizes
 from camcomp.model.cutting.track import lay_track
 from camcomp.model.job import Job
-from camcomp.model.motion.response import Travel, aim_at, respond
+from camcomp.model.motion.response import aim_at, respond
+from camcomp.model.motion.travel import Travel
 
 PER_SECTION = 4  # points looked at within each straight move or section of an arc
 ARC_STEP = 0.1  # rad, section of an arc
@@ -81,13 +83,13 @@ class Verified:
 
 def verify(corrected: Program, original: Program, job: Job) -> Verified:
     """Residual of a corrected program. Raises CheckFailed CC604 when it is not one of this original."""
-    track = lay_track(original.path, job.conditions, job.engaged(original))
+    track = cut_at_stops(job, lay_track(original.path, job.conditions, job.engaged(original)))
     shares = shares_of(job, track)
     if shares is not None:
         track = shares.with_jumps(track)
     asked = _Original(original, job, track, shares, Orienting.of(original, job, corrected))
     with part(0.0, 0.3, points=True):
-        begin, expected = asked.commanded(0.0), asked.commanded(1.0)
+        begin, expected = asked.commanded_ends()
     step = sizes(begin - np.concatenate((original.path.start[:1], expected[:-1])))
     layout = row_layout(original.path, track, step, original.step_mm(job.config.control.resolution_mm))
     reach, foreign = asked.reach(), _other_model(corrected, job)
@@ -147,21 +149,36 @@ def _samples(path: Path, pieces: Ints, first: Ints, last: Ints) -> tuple[Ints, I
 class _Original(Programmed):
     """The original program as it ought to be corrected; pieces (p,) of its track."""
 
-    def commanded(self, w: float) -> Floats:
-        """Commanded tip (p, 3) at fraction w of every piece, as compensate would have it."""
-        track = self.track
-        pieces, at = np.arange(len(track.motion)), np.full(len(track.motion), w)
-        out = track.points(pieces, at)
-        on = np.flatnonzero(corrected_pieces(track.path, track))
-        result, _ = self.aim(on, at[on])
-        refuse_unsolved(self.program, track, on, out[on], result.status)
+    def commanded_ends(self) -> tuple[Floats, Floats]:
+        """Commanded tips (p, 3) at begin and end of every piece, as compensate would have them."""
+        track, count = self.track, len(self.track.motion)
+        if not is_late(self.job):
+            begin, end = (self._commanded(np.arange(count), np.full(count, w)) for w in (0.0, 1.0))
+            return begin, end
+        long = corrected_pieces(track.path, track) & (track.length > LOOP_MM)
+        nodes = trial_nodes(track.length, self._angle(), long, LOOP_MM)
+        out = self._commanded(nodes.piece, nodes.w)
+        return out[nodes.first[:-1]], out[nodes.first[1:] - 1]
+
+    def _commanded(self, piece: Ints, w: Floats) -> Floats:
+        """Commanded tips (k, 3) at fractions w (k,) of pieces."""
+        out = self.track.points(piece, w)
+        on = np.flatnonzero(corrected_pieces(self.track.path, self.track)[piece])
+        result, _ = self.aim(piece[on], w[on])
+        refuse_unsolved(self.program, self.track, piece[on], out[on], result.status)
         out[on] = result.commanded
-        return self.taken(pieces, at, out)
+        return self.taken(piece, w, out)
+
+    def _angle(self) -> Floats:
+        """Angles (p,) rad of the pieces that are arcs, else zero."""
+        path, track = self.track.path, self.track
+        angle = np.where(path.kind == ARC, np.abs(path.angle), 0.0)[track.motion] * (track.u1 - track.u0)
+        return np.asarray(angle)
 
     def reach(self) -> Floats:
         """Length (p,) mm of the commanded path of every piece; where the correction is large, a small arc grows or shrinks."""
         track, corrected = self.track, corrected_pieces(self.track.path, self.track)
-        angle = np.where(track.path.kind == ARC, np.abs(track.path.angle), 0.0)[track.motion] * (track.u1 - track.u0)
+        angle = self._angle()
         nodes = trial_nodes(track.length, angle, corrected & (angle > 0.0))
         points = track.points(nodes.piece, nodes.w)
         on = corrected[nodes.piece]

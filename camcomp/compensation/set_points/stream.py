@@ -18,7 +18,8 @@ from camcomp.ground.records import replace
 from camcomp.model import signal_path
 from camcomp.model.finite import not_finite
 from camcomp.model.job import Job
-from camcomp.model.motion.response import Travel, aim_at, aim_pose, respond
+from camcomp.model.motion.response import aim_at, aim_pose, respond
+from camcomp.model.motion.travel import Travel
 from camcomp.model.statics.single import PointSolver
 from camcomp.model.statics.solve import POSE, STATUS, TARGET
 

@@ -14,13 +14,24 @@ from typing import Any
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats
-from camcomp.ground.records import dataclass, fields, replace
+from camcomp.ground.records import fields, replace
 from camcomp.ground.vectors import largest
 from camcomp.model import signal_path
 from camcomp.model.effect import Load, Motion
 from camcomp.model.finite import not_finite
-from camcomp.model.hysteresis import direction, ways
+from camcomp.model.hysteresis import ways
 from camcomp.model.job import Job
+from camcomp.model.motion.travel import (
+    STILL_MM,
+    WORDS,
+    Travel,
+    ahead_of_loops,
+    lead,
+    motion_of,
+    set_point_rates,
+    set_points,
+    without_inverted_loops,
+)
 from camcomp.model.statics.lengths import LENGTH_STEP_MM, lengthened
 from camcomp.model.statics.machine import Machine, build_machine
 from camcomp.model.statics.masses import MassLoads, has_moved_mass, mass_loads, mass_loads_around
@@ -29,50 +40,16 @@ from camcomp.model.statics.solve import FREE, State, inverse, solve, with_rows
 from camcomp.model.statics.target import Correction, correct, settle
 
 SETTLED_MM = 2e-5  # residual at which the correction of effects ends
-STILL_MM = 1e-10  # residual at which a point is left alone while others go on
 MAX_AIM_STEPS = 50  # reversing friction in a soft drive reduces the residual by only a tenth per step
 FARTHER = 2.0  # times the squared residual before: growth beyond which steps are halved
-REST_S = 60.0
 AROUND_S = 0.03  # half width of the difference for the acceleration: 0.6 mm at 20 mm/s
 AHEAD_MM = 2.0  # more than any play
 SURELY = 1.5  # times the play: farthest position of an encoder that is checked for a flank
 LEAST_MM = 2e-4  # smallest reversal after which a drive is moved through its play
-WORDS = 3  # actuators that X, Y, Z can move one by one
 GOES_ALONG = 1e-2  # weight of the others
 RATE_STEP = 1e-2  # mm at POSE_SCALE
 POSE_SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])  # mm per mm, mm per rad of a platform: 1 urad counts as 1 nm
 HINGE_MM = 1e3  # mm per rad of a hinge, where limits in mm apply to it: an arm of 1 m
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Travel:
-    """n points in the order of travel: cutting force (n, 3) N in the machine frame, time, minutes of cutting.
-
-    stop: the controller stops there. around (3, n, 3): programmed tips, program frame, AROUND_S before, at and after the
-    nearest instant on the same smooth part of the path; None where time is unknown. rotation (n, 3, 3): commanded
-    orientation of the platform, machine frame; None: the one that the machine holds.
-    """
-
-    force: Floats
-    time: Floats  # (n,) s
-    cut_min: Floats  # (n,) minutes
-    stop: Bools
-    around: Floats | None = None
-    rotation: Floats | None = None
-
-    def take(self, rows: np.ndarray) -> Travel:
-        """Some of the points; rows have to be ascending."""
-        around = None if self.around is None else self.around[:, rows]
-        rotation = None if self.rotation is None else self.rotation[rows]
-        return Travel(
-            force=self.force[rows], time=self.time[rows], cut_min=self.cut_min[rows], stop=self.stop[rows],
-            around=around, rotation=rotation,
-        )  # fmt: skip
-
-    @property
-    def rested(self) -> Floats:
-        """Times (n,) s with a pause of REST_S before every stop, after which a servo has settled."""
-        return self.time + REST_S * np.cumsum(self.stop)
 
 
 class LatestSolutions:
@@ -129,13 +106,13 @@ def respond(
         )
         return _finite(job, job.frame.to_program(loaded), settled)
     latest = latest or LatestSolutions()
-    set_points = partial(_set_points, job)
-    nominal = latest.of("set-points", set_points, told=told, force=travel.force, rotation=travel.rotation)
+    told_points = partial(set_points, job)
+    nominal = latest.of("set-points", told_points, told=told, force=travel.force, rotation=travel.rotation)
     setpoint = nominal if rho is None else rho
-    motion = _motion(job, setpoint, travel)
+    motion = motion_of(job, setpoint, travel)
     loading = cache(partial(signal_path.loaded, job.causes, motion, travel.force))
     if aim is not None:
-        nominal = latest.of("nominal", set_points, told=aim, force=travel.force, rotation=travel.rotation)
+        nominal = latest.of("nominal", told_points, told=aim, force=travel.force, rotation=travel.rotation)
     masses = cache(partial(_mass_loads, job, nominal, travel)) if has_moved_mass(job.real_machine.robot) else None
     held = cache(partial(_held, job, told, motion, travel, latest=latest))
     motion = replace(motion, names=job.real_machine.actuators, held=held, told=lambda: commanded, masses=masses)
@@ -155,14 +132,6 @@ def respond(
     tip = signal_path.placed(job.causes, signal_path.clamped(job.causes, tip), load, motion)
     state = replace(state, commanded=told, rho=setpoint, rho_nominal=nominal, drive=drive)
     return _finite(job, tip, Correction.of(state, state.passes))
-
-
-def _set_points(job: Job, told: Floats, force: Floats, rotation: Floats | None) -> Floats:
-    """Set-points (n, m) of commanded tips (n, 3), machine frame."""
-    answers = job.real_machine.answers
-    if answers is not None and rotation is None:
-        return answers.set_points(told, force)  # type: ignore[no-any-return]
-    return inverse(job.real_machine, told, rotation)
 
 
 def _held(job: Job, told: Floats, motion: Motion, travel: Travel, latest: LatestSolutions | None = None) -> Floats:
@@ -233,8 +202,9 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str, *, tips_only: 
     found = without_drives(job, target, travel, method, tips_only=tips_only and not job.causes)
     commanded = job.frame.to_program(found.commanded)
     if job.causes and method != "linear":
+        loops, job = without_inverted_loops(job.correctable, words=True)
         commanded = commanded + _through_play(job, found, travel)
-        share, least, near, job = 1.0, np.inf, commanded, job.correctable
+        share, least, near = 1.0, np.inf, commanded
         rings = bool(signal_path.acting(job.causes, "control"))
         near_target = target if has_moved_mass(job.real_machine.robot) else None  # masses move with the target
         latest = LatestSolutions()  # a drive that stands in its play takes all steps, and most points only a few
@@ -253,6 +223,7 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str, *, tips_only: 
             found = replace(found, status=np.where(found.status == 0, state.status, found.status))
             if not np.abs(left).max(initial=0.0) > SETTLED_MM:
                 break
+        commanded = ahead_of_loops(job, loops, commanded, travel, found.status == 0)
     return replace(found, commanded=commanded)
 
 
@@ -272,11 +243,12 @@ def aim_pose(
     if not job.causes:
         drive = np.where(on[:, None], exact.drive, np.nan)
         return replace(exact, rho=rho, drive=drive)
+    loops, aimed = without_inverted_loops(job.correctable, words=False)
     if on.any():
-        rho[on] -= _lost_motion(job, exact.rho[on], exact.drive[on], travel.take(np.flatnonzero(on)))
+        rho[on] -= _lost_motion(aimed, exact.rho[on], exact.drive[on], travel.take(np.flatnonzero(on)))
     rates = np.nan_to_num(_rates(job, job.frame.to_machine(target)))
-    aimed = job.correctable
-    share, least, near, rings = 1.0, np.inf, rho, bool(signal_path.acting(job.causes, "control"))
+    share, least, near = 1.0, np.inf, rho
+    rings = bool(signal_path.acting(aimed.causes, "control"))
     for _ in range(MAX_AIM_STEPS):
         tip, state = respond(aimed, commanded, travel, target, before=before, rho=rho)
         left = np.column_stack((job.frame.vectors(target - tip), -state.tilt))
@@ -291,7 +263,8 @@ def aim_pose(
             break
         rho = rho + share * np.einsum("nij,nj->ni", rates, left)
     if aimed is not job:
-        state = respond(job, commanded, travel, target, before=before, rho=state.rho)[1]
+        rho = np.where(on[:, None], lead(aimed, loops, state.rho, travel), state.rho)
+        state = respond(job, commanded, travel, target, before=before, rho=rho)[1]
     return state
 
 
@@ -314,7 +287,7 @@ def acting_force(job: Job, rho: Floats, travel: Travel, at: Bools) -> Floats:
     if not signal_path.acting(job.causes, "process"):
         return travel.force[at]
     travel = travel.take(at)
-    return signal_path.loaded(job.causes, _motion(job, rho, travel), travel.force).force
+    return signal_path.loaded(job.causes, motion_of(job, rho, travel), travel.force).force
 
 
 def without_drives(
@@ -329,8 +302,8 @@ def without_drives(
     load = Load(travel.force, np.zeros((len(target), 6)))
     if job.causes:
         told = job.frame.to_machine(target)
-        nominal = _set_points(job, told, travel.force, travel.rotation)
-        load = signal_path.loaded(job.causes, _motion(job, nominal, travel), travel.force)
+        nominal = set_points(job, told, travel.force, travel.rotation)
+        load = signal_path.loaded(job.causes, motion_of(job, nominal, travel), travel.force)
     aim = job.frame.to_machine(target)
     return correct(
         job.real_machine, aim, load.force, load.wrench, method, pose=pose, rotation=travel.rotation, tips_only=tips_only
@@ -358,7 +331,7 @@ def _lost_motion(job: Job, carriage: Floats, drive: Floats, travel: Travel) -> F
     """
     length = way_per_unit(job)
     sense = ways(carriage * length, LEAST_MM)
-    motion = replace(_motion(job, carriage + AHEAD_MM / length * sense, travel), held=lambda: drive)
+    motion = replace(motion_of(job, carriage + AHEAD_MM / length * sense, travel), held=lambda: drive)
     lag = _by_memory(job, motion)
     lag[sense == 0.0] = 0.0
     return lag
@@ -373,7 +346,7 @@ def _by_memory(job: Job, motion: Motion) -> Floats:
 def behind_encoders(job: Job, commanded: Floats, travel: Travel) -> tuple[Floats, Floats]:
     """Encoders (n, m) of commanded tips (n, 3), program frame, and carriage minus encoder (n, m) by the memory of drives."""
     told = job.frame.to_machine(commanded)
-    motion = _motion(job, inverse(job.real_machine, told, travel.rotation), travel)
+    motion = motion_of(job, inverse(job.real_machine, told, travel.rotation), travel)
     motion = replace(motion, held=cache(partial(_held, job, told, motion, travel)))
     return motion.encoder, _by_memory(job, motion)
 
@@ -383,11 +356,7 @@ def _tip_way(job: Job, tip: Floats, by: Floats, travel: Travel) -> Floats:
 
     With more actuators than X, Y, Z can move independently, the others move along.
     """
-    h = 1e-3
-    sides = (tip + h * axis for axis in np.eye(3)), (tip - h * axis for axis in np.eye(3))
-    ahead, behind = ([_set_points(job, each, travel.force, travel.rotation) for each in side] for side in sides)
-    rates = [(a - b) / (2.0 * h) for a, b in zip(ahead, behind, strict=True)]
-    slopes = np.stack(rates, axis=2)
+    slopes = set_point_rates(job, tip, travel)
     if by.shape[1] > WORDS:
         slopes = np.where((by != 0.0)[:, :, None], slopes, GOES_ALONG * slopes)
     way = np.einsum("nkm,nm->nk", np.linalg.pinv(slopes), by)
@@ -418,7 +387,7 @@ def gives_way(job: Job) -> bool:
         return False
     home = job.real_machine.home[None]
     nothing = Travel(force=np.zeros((1, 3)), time=np.zeros(1), cut_min=np.zeros(1), stop=np.zeros(1, np.bool_))
-    return bool(_on_flanks(job, _motion(job, home, nothing), np.full_like(home, np.finfo(float).max)).any())
+    return bool(_on_flanks(job, motion_of(job, home, nothing), np.full_like(home, np.finfo(float).max)).any())
 
 
 def load_flanks(job: Job, found: Correction, travel: Travel) -> tuple[Floats, Bools]:
@@ -427,7 +396,7 @@ def load_flanks(job: Job, found: Correction, travel: Travel) -> tuple[Floats, Bo
     A row is unstable where the load at the encoder, a play away from the carriage, holds the carriage on another flank. With
     friction behind the play the encoder may lie on either side of the carriage, by the play and by the wind-up.
     """
-    motion = _motion(job, found.rho, travel)
+    motion = motion_of(job, found.rho, travel)
     flank = _on_flanks(job, motion, found.drive)
     half = _on_flanks(job, motion, np.full_like(found.drive, np.finfo(float).max))
     poses = [replace(motion, ordered=False, direction=np.full_like(flank, each)) for each in (0.0, 1.0)]
@@ -449,7 +418,7 @@ def _on_flanks(job: Job, motion: Motion, drive: Floats) -> Floats:
 
 def _found_motion(job: Job, found: Correction, travel: Travel) -> Motion:
     """Motion of the carriages of a solution, with their drive forces."""
-    return replace(_motion(job, found.rho, travel), held=lambda: found.drive)
+    return replace(motion_of(job, found.rho, travel), held=lambda: found.drive)
 
 
 def _drive_errors(job: Job, motion: Motion) -> Floats:
@@ -460,20 +429,3 @@ def _drive_errors(job: Job, motion: Motion) -> Floats:
 def _differ(job: Job, one: Motion, other: Motion) -> Bools:
     """Mask (m,) of actuators whose carriage error differs between two motions."""
     return np.asarray((_drive_errors(job, one) != _drive_errors(job, other)).any(axis=0))
-
-
-def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
-    """Motion for the hooks, with the encoders behind the servos."""
-    stiffness = signal_path.springs(job.real_machine.robot)
-    zero = np.zeros_like(setpoint)
-    warm = job.config.process.temperature_C
-    heat = None if warm is None else np.full(len(setpoint), warm)
-    motion = Motion(
-        time=travel.rested, common=travel.time, cut_min=travel.cut_min, temperature=heat, encoder=setpoint,
-        speed=zero, direction=zero, home=job.real_machine.home, stiffness=stiffness, names=job.real_machine.actuators,
-    )  # fmt: skip
-    encoder = signal_path.controlled(job.causes, job.real_machine.actuators, motion)
-    dt = np.diff(travel.rested, prepend=travel.time[:1] - 1.0)
-    step = np.diff(encoder, axis=0, prepend=encoder[:1])
-    speed = np.divide(step, dt[:, None], out=np.zeros_like(step), where=dt[:, None] > 0.0)
-    return replace(motion, encoder=encoder, speed=speed, direction=direction(encoder))

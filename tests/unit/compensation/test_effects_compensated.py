@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.program.verify import verify
+from camcomp.gcode.interpret import read_program
 from camcomp.model.config.load import load_config
 from camcomp.model.control import open_program
 from camcomp.model.job import Job
@@ -120,3 +122,16 @@ def test_a_short_wave_of_a_scale_is_made_up_for(tmp_path, period):
     tip = told + 0.01 * np.sin(2.0 * np.pi * told / period)
     asked = np.interp(told, ends, np.concatenate(([0.0], result.rows.target[:, 0])))
     assert np.abs(tip - asked).max() < 1.2e-3
+
+
+@pytest.mark.parametrize(("time_constant_ms", "verified_um"), [(2.0, 1.2), (20.0, 6.0)])
+def test_a_lag_is_led_behind_and_in_front_of_stops_too(tmp_path, time_constant_ms, verified_um):
+    """verify finds the same on the lines; it does not know how fast moves follow one another within a piece."""
+    lines = "G21 G90 G17 G94\nG0 X0 Y0 Z5\nG1 Z0 F300\nX30 F1200\nG3 X30 Y30 J15\nG1 X0\nY0\nG0 Z5\nM2\n"
+    (tmp_path / "in.nc").write_text(lines)
+    effect = f"{{effect: servo_lag, time_constant_ms: {time_constant_ms}}}"
+    result, job = done(tmp_path, effect, tmp_path / "in.nc")
+    assert 1e3 * np.linalg.norm(result.before, axis=1).max() > 20.0 * time_constant_ms
+    assert 1e3 * np.linalg.norm(result.after, axis=1).max() <= 1.1
+    checked = verify(read_program(result.written.data, name="out.nc"), result.program, job)
+    assert max(each.residual_um for each in checked.lines if each.line != 5) < verified_um

@@ -10,7 +10,8 @@ from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
 from camcomp.model.effect import Load, Motion
 from camcomp.model.job import Job
-from camcomp.model.motion.response import Travel, aim_at, respond
+from camcomp.model.motion.response import aim_at, respond
+from camcomp.model.motion.travel import Travel
 from camcomp.model.signal_path import controlled, driven, placed
 
 CONFIG = Path(__file__).parents[3] / "config"

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from camcomp.effects import servo_overshoot
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.job import Job
 from camcomp.model.motion import response
-from camcomp.model.motion.response import SETTLED_MM, LatestSolutions, Travel, aim_at, respond
+from camcomp.model.motion.response import SETTLED_MM, LatestSolutions, aim_at, respond
+from camcomp.model.motion.travel import Travel
 
 POINTS, STANDS = 200, 101
 PLAY = "effects: [{effect: backlash, target: x, width_mm: 0.02}]\nprocess: {force: {model: none}}\n"
@@ -51,13 +53,34 @@ def test_a_drive_that_stands_in_its_play_does_not_have_all_points_solved_again(t
     assert np.delete(left, STANDS).max() < SETTLED_MM < left[STANDS]
 
 
-def test_an_oscillating_loop_has_all_points_solved_in_every_step(tmp_path, solved):
+def test_an_oscillating_loop_without_inverse_has_all_points_solved_in_every_step(tmp_path, solved, monkeypatch):
+    monkeypatch.delattr(servo_overshoot, "invert_servo")
     job = jobs(tmp_path, LOOP)
     target, travel = along_x(
         10.0 + np.arange(POINTS) * 0.1 * (np.arange(POINTS) > STANDS)
     )  # the half that stands is met
     aim_at(job, target, travel, "newton")
     assert set(solved) == {POINTS}
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        "servo_lag, time_constant_ms: 50",
+        "servo_overshoot, period_ms: 40, damping: 0.4",
+    ],
+)
+def test_a_loop_with_an_inverse_has_no_more_points_solved(tmp_path, solved, loop):
+    target, travel = along_x(20.0 + 10.0 * np.sin(0.05 * np.arange(POINTS)))
+    asked = []
+    for more in ("", f", {{effect: {loop}}}"):
+        solved.clear()
+        job = jobs(tmp_path, PLAY.replace("}]", f"}}{more}]"))
+        found = aim_at(job, target, travel, "newton")
+        asked.append(sum(solved))
+    assert asked[0] == asked[1] > 0
+    left = target - respond(job, found.commanded, travel)[0]
+    assert np.abs(left).max() < 1e-4
 
 
 def test_answers_are_those_of_all_inputs_and_only_changed_ones_are_asked_for():
