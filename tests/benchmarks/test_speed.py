@@ -144,6 +144,33 @@ def test_rapids_between_cuts(tmp_path):
     tell("  times the time of cuts alone (wanted: 5 at most)", f"{times[1] / times[0]:.1f}")
 
 
+MEMORY = {
+    "a lag": "[{effect: servo_lag, time_constant_ms: 5}]",
+    "play": "[{effect: backlash, target: x, width_mm: 0.02}]",
+    "play and a lag": "[{effect: backlash, target: x, width_mm: 0.02}, {effect: servo_lag, time_constant_ms: 5}]",
+    "a swinging loop and a lag": (
+        "[{effect: servo_overshoot, period_ms: 40, damping: 0.4}, {effect: servo_lag, time_constant_ms: 5}]"
+    ),
+}
+
+
+@pytest.mark.parametrize("moves", [5_000, 30_000, 60_000])
+def test_effects_with_memory(tmp_path, moves):
+    """By processor time, against the same program without effects; what is left is told, and fails no run here."""
+    program, effects, summary = (tmp_path / name for name in ("p.nc", "effects.yaml", "s.json"))
+    write(program, moves)
+    words = [program, *MACHINE, "-o", tmp_path / "out.nc", "--tolerance-um", 100]
+    without = min(compensate(*words)[1] for _ in range(4))
+    for name, text in MEMORY.items():
+        effects.write_text(f"effects: {text}\n")
+        own = min(compensate(*words, "--config", effects, "--summary", summary)[1] for _ in range(3))
+        left = json.loads(summary.read_text())["after"]["max_um"]
+        tell(
+            f"{moves} lines with {name}, times the time without (wanted: 4 at most)",
+            f"{own / without:.1f}, {left:.2f} um left",
+        )
+
+
 def parquet():
     try:
         import pyarrow.parquet  # noqa: F401
