@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.stats import binned_statistic
 
 from camcomp.ground.datatypes import Bools, Floats, Path
 
@@ -110,8 +111,6 @@ def _turn(circle: Circle, counter_clockwise: bool, commanded: Floats, known: Boo
 def _every_degree(at: Floats, values: Floats) -> Floats:
     """Values (n,) at angles (n,) deg as means over sectors of two rows or a degree, whichever is wider, at (360,) degrees."""
     sectors = int(np.clip(len(at) // 2, 24, 360))
-    k = np.minimum((at * sectors / 360.0).astype(int), sectors - 1)
-    count = np.bincount(k, minlength=sectors)
-    seen = count > 0
-    centre, mean = (np.bincount(k, each, sectors)[seen] / count[seen] for each in (at, values))
-    return np.asarray(np.interp(np.arange(360) + 0.5, centre, mean, period=360.0))
+    centre, mean = binned_statistic(at, [at, values], bins=sectors, range=(0.0, 360.0)).statistic
+    seen = np.isfinite(mean)
+    return np.asarray(np.interp(np.arange(360) + 0.5, centre[seen], mean[seen], period=360.0))
