@@ -45,7 +45,7 @@ from camcomp.diagnosis.result.types import (
 from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
 from camcomp.diagnosis.search.indistinguishable import classes
 from camcomp.diagnosis.search.unexplained import worst
-from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
+from camcomp.diagnosis.search.unknown import residual_tests
 from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.evidence import estimate
@@ -364,7 +364,5 @@ def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[Mapping[str, 
         lines = tuple((f"time:{line['axis']}", line["share"]) for line in heard)
         labels = tuple(sorted((*lines, *found.left[found.unknown_in]), key=lambda each: -each[1]))
     else:
-        null = problem.refit(())
-        at_null = residual_tests(problem, null, firm_prior(problem))
-        labels = next(iter(at_null.values()), ())
+        labels = next(iter(residual_tests(problem, problem.refit(())).values()), ())
     return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:MOST_LISTED] if share > MINOR**2]

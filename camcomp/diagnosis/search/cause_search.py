@@ -16,7 +16,7 @@ from camcomp.diagnosis.model.verdict import Word, decide
 from camcomp.diagnosis.search.credible import MODELLED, credibility, with_unmodelled
 from camcomp.diagnosis.search.fitted_sets import FittedSets
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
-from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
+from camcomp.diagnosis.search.unknown import foretelling, residual_tests
 from camcomp.diagnosis.statistics.evidence import misfit
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
 from camcomp.diagnosis.statistics.score_test import Shares
@@ -81,7 +81,7 @@ class CauseSearch:
     sets: RankedSets
     word: Word
     stated: Mapping[int, float]  # calibrated probability of every candidate of a fitted set
-    left: Mapping[str, Shares]  # per kind of channel
+    left: Mapping[str, Shares]  # per kind of channel, where something unmodelled shows
     unknown_in: str | None  # the kind in which an effect shows that the library does not have
     beyond: Mapping[str, Unexplained]  # what unseen runs show beyond the floor, per kind of channel
 
@@ -94,7 +94,7 @@ def search_causes(problem: Problem) -> CauseSearch:
     ranked = _with_answer(problem, ranked, known, temperature)
     credible, imitated = _weigh_imitations(problem, known, credible, beyond, kind)
     stated = _stated(ranked, credible, imitated=imitated)
-    left = residual_tests(problem, known, problem.prior if kind is None else firm_prior(problem))
+    left = residual_tests(problem, known) if kind else {}
     kind = kind if kind is None or kind in left else next(iter(left))
     return CauseSearch(
         sets=ranked, word=_verdict(ranked, stated, kind), stated=stated, left=left, unknown_in=kind, beyond=beyond

@@ -23,8 +23,9 @@ SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which
 CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
 
 
-def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, Shares]:
-    """Score test on the residual of a set, per kind of channel; prior: of all other columns."""
+def residual_tests(problem: Problem, f: Fitted) -> dict[str, Shares]:
+    """Score test on the residual of a set, per kind of channel."""
+    prior = firm_prior(problem)
     joint = joint_products(problem, f, [np.ones(len(r)) for r in f.residual])
     patterns = np.arange(len(prior.tolerance), len(joint.b))
     P, h = posterior(joint, prior, problem.member_columns(f.members)).blocks_without([patterns])[0]
