@@ -21,7 +21,9 @@ REMEDY = (
 )
 SOURCE = "first-order position loop, tau = 1/kv (Gross, Hamann, Wiegaertner: Electrical feed drives in automation)"
 _KV = "loop gains kv of 100 to 2000 1/s"
-FITTED = (Parameter("time_constant_ms", "ms", 0.0, -500.0, 500.0, 3.0, 0.005, _KV),)
+FITTED = (Parameter("time_constant_ms", "ms", 0.0, 0.0, 500.0, 3.0, 0.005, _KV, sign=1),)
+# In logs of axes whose encoders are ahead of their set-points by half a row or more.
+FITTED_AHEAD = (Parameter("time_constant_ms", "ms", 0.0, -500.0, 500.0, 3.0, 0.005, "set-points logged late"),)
 PARAMETERS = (
     Parameter("time_constant_ms", "ms", 0.0, -500.0, 500.0, 3.0, 0.005, f"{_KV}; joints of arms up to 200 ms"),
 )

@@ -40,7 +40,7 @@ class ChannelData:
 
     train, test: runs that are fitted, and that are judged only. floor: noise of the channel. whole: times and values of every row,
     those that count where it is not given. asymmetric: whether friction in the drive force differs between the
-    directions, which deflects the loop. unsure (n,) per run: uncertainty of rows in addition to the floor, 0 where it is not
+    directions, which deflects the loop. ahead: whether encoders are ahead of their set-points by half a row or more. unsure (n,) per run: uncertainty of rows in addition to the floor, 0 where it is not
     given; misfit: rms residual in floors, at least 1, to which it is added. between (n, 2) per run: uncertainty by the
     set-points between two rows, which no log holds. healthy: columns of the sizes that every axis has; inertia: those that
     are force of inertia alone; minor: kinds of healthy sizes that are no larger than on a healthy machine, while others may be as
@@ -61,6 +61,7 @@ class ChannelData:
     stated: bool
     whole: Sequence[tuple[Floats, Floats]] = ()
     asymmetric: bool = False
+    ahead: bool = False
     unsure: Sequence[Floats] = ()
     misfit: float = 1.0
     between: Sequence[Floats] = ()

@@ -235,9 +235,17 @@ def _begun(motion: Motion, start: Floats) -> Motion:
 
 
 def candidates(
-    robot: Robot | None, axes: Sequence[DrivenAxis], channel: ChannelName, without: Sequence[str]
+    robot: Robot | None,
+    axes: Sequence[DrivenAxis],
+    channel: ChannelName,
+    without: Sequence[str],
+    *,
+    ahead: bool = False,
 ) -> list[AxisCause]:
-    """Effects of the library, and of users, that may act on a channel of an axis, once for each shape."""
+    """Effects of the library, and of users, that may act on a channel of an axis, once for each shape.
+
+    ahead: whether encoders are ahead of their set-points.
+    """
     actuator = axes[0].actuator
     found: list[AxisCause] = []
     for name, module in shelf.usable("effects", ("none", *ELSEWHERE, *without)):
@@ -248,6 +256,7 @@ def candidates(
         if not _acts(name, module, axes[0], channel):
             continue
         own = signal_path.fitted_parameters(module, actuator.revolute)
+        own = getattr(module, "FITTED_AHEAD", own) if ahead else own
         linear = tuple(p for p in own if not p.shape)
         shapes = _shapes(module, own, axes, channel)
         fits = [(shape, linear) for shape in shapes if linear]

@@ -56,7 +56,7 @@ def study_channel(found: AxisFindings, rows: ChannelData, around: AxisSurroundin
     seen, axes = rows.seen, [around.driven(found.name, run) for run in rows.runs]
     if force:
         axes = [replace(a, way=_way(a.run, m, on)) for a, m, on in zip(axes, rows.moves, seen, strict=True)]
-    terms = candidates(around.robot, [axes[k] for k in rows.train], rows.channel, sorted(without))
+    terms = candidates(around.robot, [axes[k] for k in rows.train], rows.channel, sorted(without), ahead=rows.ahead)
 
     def response(k: int, acting: Sequence[tuple[AxisCause, Floats]]) -> Floats:
         causes = [term.cause(own.tolist()) for term, own in acting if term.run in (None, rows.runs[k].name)]

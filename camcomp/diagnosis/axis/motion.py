@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from camcomp.diagnosis.axis.findings import ROWS, AxisFindings, AxisRun
+from camcomp.diagnosis.axis.gate import WITHIN
 from camcomp.diagnosis.axis.terms import (
     TURNS_MM_PER_S,
     WIDE,
@@ -40,10 +41,12 @@ def encoder_width(runs: list[AxisRun], train: list[int], bodies: list[Floats] | 
 
 
 def lateness(runs: list[AxisRun], gaps: list[Floats], train: list[int]) -> float:
-    """How late (s) the axis follows its set-points, on average; below 0 where these are logged late."""
+    """How late (s) the axis follows its set-points, on average; below 0 where these are logged late, by half a row or more."""
     moves = [travel(runs[k].time, runs[k].setpoint) for k in train]
     A = np.concatenate([_usual(m)[runs[k].clear] for k, m in zip(train, moves, strict=True)])
-    return float(np.clip(solve(A, np.concatenate([gaps[k][runs[k].clear] for k in train]))[2], -LATEST_S, LATEST_S))
+    late = float(solve(A, np.concatenate([gaps[k][runs[k].clear] for k in train]))[2])
+    row = max(float(np.median(np.diff(runs[k].time))) for k in train)
+    return float(np.clip(late, 0.0 if late > -WITHIN * row else -LATEST_S, LATEST_S))
 
 
 def motion_of(

@@ -206,8 +206,9 @@ def _study_following(found: AxisFindings, task: AxisTask, asymmetric: bool) -> f
     ]
     rows = ChannelData(
         channel="following", runs=every, moves=moves, values=values, train=train, test=task.test, floor=floor,
-        stated=stated is not None, whole=[(r.time, r.gap) for r in every], asymmetric=asymmetric, unsure=[np.abs(own).max(axis=1) for own in unseen],
-        between=unseen, between_s2=by_acceleration_between_rows(every[train[0]].time, late),
+        stated=stated is not None, whole=[(r.time, r.gap) for r in every], asymmetric=asymmetric, ahead=late < 0.0,
+        unsure=[np.abs(own).max(axis=1) for own in unseen], between=unseen,
+        between_s2=by_acceleration_between_rows(every[train[0]].time, late),
     )  # fmt: skip
     found.following = study_channel(found, rows, task.around, task.without)
     return late
