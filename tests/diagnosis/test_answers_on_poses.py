@@ -16,12 +16,17 @@ def judged(folder, seed):
     return result, judge(result, truth, library())
 
 
+KNOWN = {23001: "none", 24016: "unknown by the place of another joint", 25016: "not unknown, or by another covariate"}
+
+
 def some(experiments, in_ci):
-    """Parameters of a test from experiments by the number of the generator; ids name the faults."""
-    return [
-        pytest.param(number, marks=() if number in in_ci else pytest.mark.campaign, id=what if isinstance(what, str) else what[-1])
-        for number, what in experiments.items()
-    ]  # fmt: skip
+    """Parameters of a test from experiments by the number of the generator; ids name the faults, marks those known to be wrong."""
+    out = []
+    for number, what in experiments.items():
+        marks = [] if number in in_ci else [pytest.mark.campaign]
+        marks += [pytest.mark.xfail(strict=True, reason=KNOWN[number])] if number in KNOWN else []
+        out.append(pytest.param(number, marks=marks, id=what if isinstance(what, str) else what[-1]))
+    return out
 
 
 FEW = {
