@@ -110,6 +110,29 @@ def test_set_points_that_are_logged_late_are_told_in_a_joint_that_does_not_move_
     assert "No error moves the tip: J6 errs by" in verdict_text(result)
 
 
+def steady_moves(rng, until=60.0, step=1e-3):
+    """Times and positions (n,) of a slide that goes from place to place at steady speeds, reached within 40 ms, and rests for 3 s."""
+    place, parts = 0.0, [np.zeros(1000)]
+    while sum(map(len, parts)) * step < until:
+        goal, speed = rng.uniform(0.0, 60.0), rng.choice([10.0, 20.0])
+        parts += [np.linspace(place, goal, int(abs(goal - place) / speed / step) + 1)[1:], np.full(3000, goal)]
+        place = goal
+    way = np.convolve(np.concatenate(parts), np.ones(40) / 40, "valid")
+    return step * np.arange(len(way)), way
+
+
+def test_an_encoder_that_is_read_some_milliseconds_off_its_row_has_nothing_wrong(tmp_path):
+    """At 10 Hz; the axis is on its set-points."""
+    for seed, name in enumerate("ab"):
+        rng = np.random.default_rng(seed)
+        t, way = steady_moves(rng)
+        row = t[100:-100:100]
+        read = np.interp(row + rng.normal(0, 0.003, len(row)), t, way) + rng.normal(0, 4e-4, len(row))
+        write(tmp_path, f"{name}.csv", {"t_s": row, "cmd_x_mm": np.interp(row, t, way), "act_x_mm": read})
+    result = diagnose(experiment(tmp_path, [str(ROOT / "config/cartesian.yaml")], ("a", "b"), holdout=["b"])).result
+    assert result.verdict == "none"
+
+
 def ripple(folder, name, frequency, seed):
     """J1 with 0.6 mrad sin(50 q) over 0.02 mrad of noise; J2 stands at 20 deg and J6 at 0, and the other joints are not logged."""
     t = np.arange(0, 10, 0.01)

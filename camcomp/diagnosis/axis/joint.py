@@ -126,7 +126,7 @@ def _find_ripple(found: AxisFindings, channel: AxisChannel) -> None:
 
 
 def _taken_over(friction: Floats, move: AxisTravel) -> Floats:
-    """Columns of friction, and what the integrator of a loop leaves of it.
+    """Columns of friction, and what the integrator of a loop leaves of every other one of them.
 
     A PI controller of the speed makes s / (s + 1 / T) of a force (Gross, Hamann, Wiegaertner: Electrical feed drives in
     automation); whether there is one, and its T, the rows tell.
@@ -139,12 +139,12 @@ def _following_laws(rows: ChannelData) -> dict[str, tuple[str, ...]]:
 
     The speed is that of a lag too small or too unsure to be a cause.
     """
-    laws = _pushes(rows)
+    laws = _laws_without_integrator(rows)
     taken_over = [f"washout({each}, {T:g})" for T in INTEGRAL_S for each in laws["friction"][::2]]
     return laws | {"friction": (*laws["friction"], *taken_over)}
 
 
-def _pushes(rows: ChannelData) -> dict[str, tuple[str, ...]]:
+def _laws_without_integrator(rows: ChannelData) -> dict[str, tuple[str, ...]]:
     """Formulas by kind where the loop has no integrator."""
     hinge = rows.hinge
     place = "followed_rad" if hinge else "followed_mm"

@@ -25,6 +25,7 @@ from camcomp.diagnosis.axis.noise_floor import (
     between_rows,
     by_acceleration_between_rows,
     following_floor,
+    instants_apart,
     rows_floor,
 )
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
@@ -204,11 +205,12 @@ def _study_following(found: AxisFindings, task: AxisTask, asymmetric: bool) -> f
     unseen = [
         between_rows(r.time, r.setpoint, late)[np.isin(r.time, m.time)] for r, m in zip(every, moves, strict=True)
     ]
+    apart = instants_apart([values[k] for k in train], [moves[k].speed for k in train], floor)
+    unsure = [np.hypot(np.abs(own).max(axis=1), apart * m.speed) for own, m in zip(unseen, moves, strict=True)]
     rows = ChannelData(
         channel="following", runs=every, moves=moves, values=values, train=train, test=task.test, floor=floor,
         stated=stated is not None, whole=[(r.time, r.gap) for r in every], asymmetric=asymmetric, ahead=late < 0.0,
-        unsure=[np.abs(own).max(axis=1) for own in unseen], between=unseen,
-        between_s2=by_acceleration_between_rows(every[train[0]].time, late),
+        unsure=unsure, between=unseen, between_s2=by_acceleration_between_rows(every[train[0]].time, late),
     )  # fmt: skip
     found.following = study_channel(found, rows, task.around, task.without)
     return late
