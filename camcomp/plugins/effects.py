@@ -46,6 +46,7 @@ class EffectPlugin(Protocol):
     - PLAIN: short text in the language of a workshop, "play in the drive". REMEDY: advice, without a capital.
     - FITTED: tuple of Parameter that a diagnosis fits in place of PARAMETERS, with the function `public` (values of FITTED
       -> values of PARAMETERS).
+    - FITTED_AHEAD: what is fitted in place of FITTED in logs of axes whose encoders are ahead of their set-points.
     - `applies`: (robot, target) -> whether it is a candidate of a diagnosis there; default: always.
     - `first_guess`: list of time (n,) s, set-points (n,), encoders (n,) of an actuator -> initial value of its one shape.
     - TARGETS: tuple of names for TARGET "named", with OF_TARGET (target -> keys that apply there) and SOUGHT (target ->
@@ -130,7 +131,7 @@ def checked(name: str, found: Any, who: str) -> ModuleType:
     if not module.PARAMETERS and not hasattr(module, "Params"):
         raise refusal(who, "PARAMETERS is empty")
     check_names(who, module, {key: str for key in ("PLAIN", "REMEDY") if hasattr(module, key)})
-    for key in ("PARAMETERS", "FITTED", "ROTARY"):
+    for key in ("PARAMETERS", "FITTED", "FITTED_AHEAD", "ROTARY"):
         _check_parameters(who, key, getattr(module, key, ()))
     if hasattr(module, "Params"):
         check_params(who, module.Params, {*_YAML_KEYS, *nominal(module)} - {"source"})
