@@ -68,27 +68,44 @@ def _lag_shares(dt, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @inner
-def _speed(y, t, k):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _takes_up_play(y, t, k, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Whether y turns round at instant k at a speed that it does not keep to: an encoder that goes through the play of its drive."""
+    if not 0 < k < t.shape[0] - 2:
+        return False
+    step, dt, after = y[k + 1] - y[k], t[k + 1] - t[k], t[k + 2] - t[k + 1]
+    turns = AT_ONCE * tau < dt and max(dt, after) < REST_S and step * (y[k] - y[k - 1]) < 0.0
+    return turns and abs(step) * after > 2.0 * abs(y[k + 2] - y[k + 1]) * dt
+
+
+@inner
+def _speed(y, t, k, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Speed at instant k by a parabola through its neighbours, or from the one before if the motion ends."""
     dt = t[k] - t[k - 1]
     before = (y[k] - y[k - 1]) / dt if dt > 0.0 else 0.0
     after = t[k + 1] - t[k] if k + 1 < t.shape[0] else 0.0
-    if not 0.0 < after < REST_S:
+    if not 0.0 < after < REST_S or _takes_up_play(y, t, k, tau):
         return before
     return before + ((y[k + 1] - y[k]) / after - before) * dt / (dt + after)
 
 
 @inner
-def _later(t, i, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """The instant to whose position a lag is led from instant i: the next but within SOON tau, not in front of a very short step."""
+def _later(y, t, i, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """The instant to whose position a lag is led from instant i, and the time (s) within which it gets there.
+
+    Instant i itself if it is late enough; else the next but within SOON tau, not in front of a very short step, and none beyond an
+    instant at which play is taken up; behind that the next one, because an encoder that goes too far takes the carriage along.
+    """
+    behind_play = _takes_up_play(y, t, i - 1, tau)
+    if t[i] - t[i - 1] >= DENSE * tau and not behind_play:
+        return i, 0.0
     k = i
-    while k + 1 < t.shape[0] and t[k + 1] - t[k] < REST_S:
+    while k + 1 < t.shape[0] and t[k + 1] - t[k] < REST_S and not _takes_up_play(y, t, k, tau):
         since = t[k] - t[i - 1]
         short = t[k + 1] - t[k] < SHORT * tau and since < 2.0 * SOON * tau
-        if k > i and since >= SOON * tau and not short:
+        if k > i and (behind_play or since >= SOON * tau) and not short:
             break
         k += 1
-    return k
+    return k, t[k] - t[i] if behind_play else min(t[k] - t[i], DENSE * tau)
 
 
 @kept
@@ -103,16 +120,14 @@ def _inverse_first_order(y, t, tau):  # type: ignore[no-untyped-def]  # pragma: 
             x[i] = x[i - 1] + y[i] - y[i - 1]
             continue
         decay, old, new = _lag_shares(dt, tau)
-        k = _later(t, i, tau) if dt < DENSE * tau else i
-        after = t[k] - t[i]
         for j in range(y.shape[1]):
+            k, ahead = _later(y[:, j], t, i, tau)
             coming = decay * reached[j] + old * x[i - 1, j]
-            if after > AT_ONCE * tau:
-                ahead = min(after, DENSE * tau)
+            if ahead > AT_ONCE * tau:
                 decay_ahead, old_ahead, new_ahead = _lag_shares(ahead, tau)
-                share = ahead / after
+                share = ahead / (t[k] - t[i])
                 goal = y[i, j] + share * (y[k, j] - y[i, j])
-                then = share * (y[k, j] + tau * _speed(y[:, j], t, k))
+                then = share * (y[k, j] + tau * _speed(y[:, j], t, k, tau))
                 by = decay_ahead * new + old_ahead + new_ahead * (1.0 - share)
                 x[i, j] = (goal - new_ahead * then - decay_ahead * coming) / by
             else:

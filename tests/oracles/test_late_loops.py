@@ -81,7 +81,7 @@ def missed(folder, effects, *machine):
     ("effects", "machine", "begin_s", "most_mm"),
     [
         ([LAG], [lag], 0.0, 1.3e-3),
-        ([LAG, PLAY], [lag, play], START_S, 2.0e-3),
+        ([LAG, PLAY], [lag, play], START_S, 1.3e-3),
         ([SWING], [swing], START_S, 1.2e-3),
         ([SWING, LAG], [swing, lag], START_S, 1.5e-3),
     ],
@@ -94,5 +94,5 @@ def test_the_tip_is_where_the_program_asks_for_it(tmp_path, effects, machine, be
 @pytest.mark.parametrize(("effects", "machine"), [([LAG], [lag]), ([LAG, PLAY], [lag, play])])
 def test_the_errors_stated_are_those_of_the_filters(tmp_path, effects, machine):
     t, off, stated = missed(tmp_path, effects, *machine)
-    assert stated < 1.7e-3
+    assert stated < 1.0e-3
     assert abs(off[t > START_S].max() - stated) < 3e-4

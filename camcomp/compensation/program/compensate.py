@@ -156,7 +156,10 @@ class _Correction:
             refuse_unfollowed(job, self.method, self.part)
         self.turns = load_turns(job, base)
         turned = cut_at(base, [(i, at) for i, *ends in self.turns for at in ends])
-        track, turning = cut_at_reversals(job, cut_at_stops(job, cut_at_knots(job, turned, spacing)), spacing)
+        knotted = cut_at_knots(job, turned, spacing)
+        track, reversals = cut_at_reversals(job, knotted, spacing)
+        track = cut_at_stops(job, track)
+        turning = pieces_between(knotted, track, reversals)
         self.shares = shares_of(job, base)
         if self.shares is not None:
             track, of = self.shares.divided(self.shares.with_jumps(track))
@@ -259,7 +262,7 @@ class _Correction:
             with part_of_work(1.0 - 0.6 * 0.5**round_, 1.0 - 0.35 * 0.5**round_, points=True):
                 commanded, centre, words = self._bent(nodes, shift, bend)
             found = self._written(nodes, commanded, centre, words)
-            missed = (found.worst > self.goal) & ~self.kept
+            missed = (found.worst > self.goal) & ~self.whole
             finer = tolerance * np.clip(0.9 * self.goal / np.maximum(found.worst, 1e-12), 0.3, 0.9)
             sagging = (found.points.sags(found.after.error, len(missed)) > self.budget) & ~self.whole
             if (unseen := self.by_ends & (missed | sagging)).any():

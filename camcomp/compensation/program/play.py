@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from camcomp.compensation.program.line_ends import Place, Span, cut_at, pieces_between, points_along
+from camcomp.compensation.program.line_ends import Place, Span, cut_at, points_along
 from camcomp.compensation.program.moves import corrected_pieces, travel_of
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
@@ -39,24 +39,23 @@ LOOKS = 2  # each begins where the one before has found the bends
 NEAR = 1e-3  # of the way between two points, that are one
 
 
-def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Bools]:
-    """The track with a piece of its own behind every reversal of a drive with play in a feed line, and which pieces those are.
+def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, set[Span]]:
+    """The track with a piece of its own behind every reversal of a drive with play in a feed line, as spans of the undivided one.
 
     spacing: distance of the points, mm, at which the carriages are looked at.
     """
-    none = np.zeros(len(track.motion), np.bool_)
+    lines: set[Span] = set()
+    cuts: set[Place] = set()
     if momentary(job.causes):
-        return track, none
+        return track, lines
     piece, w = points_along(track, spacing)
     travel = travel_of(job, track, piece, w)
     found = response.without_drives(job, track.points(piece, w), travel)
     if not np.isfinite(found.rho).all():  # told later, with the line
-        return track, none
+        return track, lines
     feed = track.path.kind[track.motion] != RAPID
     memory, friction = response.plays(job, found, travel), response.winds_up(job, found, travel)
     carriage = found.rho * way_per_unit(job)
-    lines: set[Span] = set()
-    cuts: set[Place] = set()
     arm = carriage.shape[1] > WORDS
     for j in np.flatnonzero(memory):
         for k in turning_points(carriage[:, j], LEAST_MM)[0]:
@@ -70,12 +69,9 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
                 continue  # a line that is not divided cannot stand for it
             lines.add((int(piece[k]), begin, ends[0]))
             cuts.update((int(piece[k]), at) for at in (begin, *ends))
-    if not cuts:
-        return track, none
-    if arm and memory.any():
+    if arm and cuts:
         cuts |= _taken_up(job, track, cuts, np.flatnonzero(memory), spacing)
-    divided = cut_at(track, cuts)
-    return divided, pieces_between(track, divided, lines)
+    return cut_at(track, cuts), lines
 
 
 def _short(track: Track, piece: int, begin: float, end: float) -> bool:

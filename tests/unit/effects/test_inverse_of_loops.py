@@ -5,6 +5,7 @@ import pytest
 
 from camcomp.ground import shelf
 from camcomp.model.effect import Cause, Motion
+from camcomp.model.hysteresis import play
 from camcomp.model.signal_path import controlled, set_points_for
 
 TAU_S = 0.005
@@ -77,6 +78,26 @@ def test_a_jump_within_no_time_takes_no_large_excursion_of_a_lag():
     ahead, got = led(causes(LAG), time, wanted)
     assert -0.05 < ahead.min() and ahead.max() < 0.1
     assert np.abs(got - wanted)[time > 0.06].max() < 1e-3
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.5, 0.9])
+@pytest.mark.parametrize("tau_s", [2e-4, 1e-3, 3e-3, 5e-3, 2e-2])
+def test_a_carriage_that_turns_round_follows_a_late_drive_through_its_play(tau_s, share):
+    """Its encoder neither leaves the flank before the turn nor goes too far behind it. Share of a step within which it goes through."""
+    step, width = 6e-3, 0.02
+    time = step * np.concatenate((np.arange(-40, 1), [share], np.arange(1, 40)))
+    fine = np.linspace(time[0], time[-1], 50_000)
+
+    def carriage(t):
+        return 9.0 * t**2
+
+    encoder = carriage(time) + np.where(time > 0.0, 0.5 * width, -0.5 * width)
+    lag = "servo_lag", {"time_constant_ms": 1e3 * tau_s}
+    ahead = led(causes(lag), time, np.column_stack((encoder, encoder)))[0]
+    between = np.column_stack([np.interp(fine, time, each) for each in ahead.T])
+    got = controlled(causes(lag), ACTUATORS, motion(fine, between))
+    off = np.abs(got + play(got, width) - carriage(fine)[:, None])
+    assert off[fine > -0.1].max() < 5e-4
 
 
 @pytest.mark.parametrize("damping", [0.1, 1.0, 3.0])
