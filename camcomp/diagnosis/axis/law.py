@@ -76,10 +76,6 @@ class AxisRows(TermRows):
         """Functions (n, f) per run over the noise."""
         return [ByChannel(v.shape[1], ((np.arange(v.shape[1]), v / self.noise),)) for v in values]
 
-    def shown(self, spot: Spot) -> Sequence[Floats]:
-        """Instants of all rows."""
-        return [m.time for m in self.moves]
-
     def folds(self, split: Split) -> Folds:
         """Residuals with the columns that were fitted, each of them as large as the channel at most."""
         every, least = np.arange(self._base[0].shape[1]), sum(self.row_counts) / self.noise**2

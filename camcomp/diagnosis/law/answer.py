@@ -12,7 +12,7 @@ from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import TermBench, spots
 from camcomp.diagnosis.law.describe import law_result, moved_without
-from camcomp.diagnosis.law.find import BETTER, FoundLaw, find_law, find_map
+from camcomp.diagnosis.law.find import BETTER, FoundLaw, find_law
 from camcomp.diagnosis.law.screen import term_grids
 from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.folds import ABOVE
@@ -20,7 +20,7 @@ from camcomp.diagnosis.result.types import Law
 from camcomp.diagnosis.search.unknown import firm_prior
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import FREE, Prior
-from camcomp.diagnosis.statistics.folds import Folds, Split, usual_split
+from camcomp.diagnosis.statistics.folds import Folds, Split
 from camcomp.ground.datatypes import Floats
 
 
@@ -55,26 +55,20 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
     if main_channels(problem).start != 0 or kind not in ("tip", "encoder"):
         return None
     bench = term_bench(problem)
-    grids = term_grids(bench, kind)
     floor, before = problem.floor.tip_um, rms_um(_gaps(problem, f))
     room = float(np.sqrt(max(before**2 - floor**2, 0.0)))
 
-    def formula(own: Fitted | None) -> FoundLaw | None:
-        return find_law(bench, _base(problem, own, bench, kind), grids, 1e-3 * floor)
-
-    def smooth(own: Fitted | None) -> FoundLaw | None:
-        return find_map(bench, _base(problem, own, bench, kind)(usual_split(len(problem.bench.runs)), False), kind)
+    def find(own: Fitted | None, smooth: bool) -> FoundLaw | None:
+        return find_law(bench, _base(problem, own, bench, kind), term_grids(bench, kind, smooth=smooth), 1e-3 * floor)
 
     best: tuple[FoundLaw, Fitted | None] | None = None
     after = before
     # what is small without the causes may be the usual small errors
-    for k, (own, find, asked) in enumerate(
-        ((f, formula, True), (None, formula, room > floor), (f, smooth, kind == "tip"))
-    ):
+    for k, (own, smooth, asked) in enumerate(((f, False, True), (None, False, room > floor), (f, True, kind == "tip"))):
         much = after**2 - floor**2 > (ABOVE - 1.0) * max(floor, room) ** 2
         if k and not (asked and much):
             continue
-        tried = find(own)
+        tried = find(own, smooth)
         left = np.inf if tried is None else rms_um(*_beside(problem, own, bench, tried))
         if tried is not None and left < BETTER * after:
             best, after = (tried, own), left

@@ -81,10 +81,6 @@ class TermRows(ABC):
     def white(self, spot: Spot, values: Sequence[Floats]) -> RunColumns:
         """Functions (n, f) per run as white columns."""
 
-    @abstractmethod
-    def shown(self, spot: Spot) -> Sequence[Floats]:
-        """Instants per run, on the common clock, of rows that show what happens at a spot."""
-
     def where(self, spot: Spot) -> str:
         """A spot in words."""
         return f"{spot.on} {self.actuators[spot.index]}" if spot.on in OF_ACTUATORS else f"tip {AXES[spot.index]}"
@@ -111,8 +107,8 @@ class TermRows(ABC):
 
     @cached_property
     def at_once(self) -> int:
-        """Forms of two functions whose values in all rows, before rows are thinned, are AT_ONCE."""
-        return max(AT_ONCE // (2 * sum(self.row_counts)), 4)
+        """Functions whose values in all rows, before rows are thinned, are AT_ONCE."""
+        return max(AT_ONCE // sum(self.row_counts), 8)
 
 
 class TermBench(TermRows):
@@ -190,14 +186,6 @@ class TermBench(TermRows):
     def white(self, spot: Spot, values: Sequence[Floats]) -> RunColumns:
         """Functions (n, f) per run as white columns of the channels that the spot reaches."""
         return [self.noise.by_channel(k, self.reached(spot, k, v)) for k, v in enumerate(values)]
-
-    def shown(self, spot: Spot) -> list[Floats]:
-        """Instants per run, on the common clock, of rows in which some channel that the spot reaches is known."""
-        out = []
-        for k, (run, t, inflate) in enumerate(zip(self.bench.runs, self.noise.time, self.noise.inflate, strict=True)):
-            seen = np.isfinite(inflate[:, self._reach(spot, k)[0]]).any(axis=1)
-            out.append(run.run_path.started + t[seen])
-        return out
 
 
 def _functions(form: Form | SmoothForm, known: Mapping[str, object]) -> Callable[[Mapping[str, Floats], int], Floats]:

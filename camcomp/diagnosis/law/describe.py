@@ -117,7 +117,7 @@ def _tidy(text: str) -> str:
 
 
 def _said(form: Form | SmoothForm) -> str:
-    return " and ".join(_tidy(each) for each in form.said) if isinstance(form, Form) else ""
+    return " and ".join(_tidy(each) for each in form.said) if isinstance(form, Form) else _over(form.about)
 
 
 def where_of(part: LawPart) -> str:

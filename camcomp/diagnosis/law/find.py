@@ -1,31 +1,30 @@
-"""The search for a law: forward selection over all terms, shapes refined, small sets tried exhaustively.
+"""The search for a law or a map: best subset of terms whose shapes are refined beside the set that was found before.
 
 A term enters where it makes withheld runs more probable by more than its prior odds: all kinds of terms at all spots are
-equally likely, and a shape was looked for among many. Source: forward selection as in sparse regression of dynamics.
+equally likely, and a shape was looked for among many.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 
-from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, TermRows, spots
-from camcomp.diagnosis.law.forms import Form, Sizes, SmoothForm
+from camcomp.diagnosis.law.bench_terms import Term, TermRows
+from camcomp.diagnosis.law.forms import Form, SmoothForm
 from camcomp.diagnosis.law.screen import TermGrid, gains_of_terms
 from camcomp.diagnosis.law.shapes import Shapes
-from camcomp.diagnosis.model.discrepancy import ORDERS
+from camcomp.diagnosis.model.candidates import PlacedCause
+from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.noise import MINOR
-from camcomp.diagnosis.model.search import MOST
+from camcomp.diagnosis.model.search import ROUNDS, search_sets
 from camcomp.diagnosis.statistics.folds import ALTERNATING, Folds, RunColumns, Split, gains, usual_split, withheld
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
 BETTER = 0.9  # of what the causes or a law leave on withheld parts: a law, or another one, has to leave less
-_SINGLE = ("heading_rad", "temp_C", "cut_min", "fx_N", "fy_N", "fz_N")  # covariates of a map by themselves
 REFINED = 7  # kinds of terms whose shapes are followed at every step
 CONSTANT = Form(family="constant", about=(), texts=("1",), units=("",))
 _PLAIN = ("line", "power", "product", "rate", "force")  # simpler kinds of the same value come first
@@ -99,43 +98,31 @@ class _Search:
         self.per_term = float(np.log(len({Term(s, f).kind for grid in grids for s in grid.spots for f in grid.forms})))
 
     def run(self) -> FoundLaw | None:
-        chosen: list[Term] = []
+        chosen: tuple[Term, ...] = ()
         pool: list[Term] = []
-        score = 0.0
-        while len(chosen) < MOST:
-            step = self._beside(chosen)
-            ranked = [each for each in gains_of_terms(self.bench, self.grids, step) if each[0] > 0.0]
-            fine = [self._refined(step, term) for _, term in self._leaders(ranked)]
-            # the other spots at which the same function of the same covariates can act
-            where = [(t, s) for t in chosen for each in self.grids if t.spot in each.spots for s in each.spots]
-            fine += [self._refined(step, Term(spot, t.form)) for t, spot in where if spot != t.spot]
-            if not fine:
+        for _ in range(ROUNDS):
+            pool = [*dict.fromkeys([*pool, *self._candidates(chosen)])]
+            before, chosen = chosen, self._best_set(pool) if pool else ()
+            if [term.kind for term in chosen] == [term.kind for term in before]:
                 break
-            fine.sort(key=lambda each: -each[0])
-            pool += [term for _, term in fine[: 2 * REFINED]]
-            near = [term for score, term in fine if score > fine[0][0] - EQUAL_LOG_ODDS]
-            best = min(near, key=lambda t: (t.form.family not in _PLAIN, len(t.form.shape), unlikely(t)))
-            after = self._score((*chosen, best))
-            if after < score + EQUAL_LOG_ODDS:
-                break
-            chosen, score = [*chosen, best], after
         if not chosen:
             return None
-        chosen = self._exhaustive(chosen, pool, score)
-        chosen = self._without_idle(chosen)
+        chosen = self._by_size(chosen)
         # cross-validation by runs cannot test terms that act in one of them alone
         self.folds = self.base(ALTERNATING if any(t.form.passing for t in chosen) else self.split, False)
         return self._answer(self._with_constants(chosen), pool)
 
-    def _with_constants(self, chosen: list[Term]) -> list[Term]:
-        """The terms, and a constant per spot where it makes withheld parts clearly more probable."""
-        for spot in dict.fromkeys(term.spot for term in chosen):
-            more = [*chosen, Term(spot, CONSTANT)]
-            if self._score(more) > self._score(chosen) + EQUAL_LOG_ODDS:
-                chosen = more
-        return chosen
-
-    # -- one step ------------------------------------------------------------------------------------------------------
+    def _candidates(self, chosen: Sequence[Term]) -> list[Term]:
+        """Terms that may join a set or replace one of its terms, each with the shape that the data want beside the others."""
+        step = self._beside(chosen)
+        ranked = [each for each in gains_of_terms(self.bench, self.grids, step) if each[0] > 0.0]
+        leaders = self._leaders(ranked)
+        # the other spots at which the same function of the same covariates can act
+        where = [(t, s) for t in chosen for each in self.grids if t.spot in each.spots for s in each.spots]
+        leaders += [Term(spot, t.form) for t, spot in where if spot != t.spot]
+        fine = sorted((self._refined(step, term) for term in leaders), key=lambda each: -each[0])
+        again = [self.shapes.followed(self._beside([o for o in chosen if o != t]), t) for t in chosen]
+        return [*again, *(term for _, term in fine[: 2 * REFINED])]
 
     def _beside(self, chosen: Sequence[Term]) -> Folds:
         """The base with the terms chosen so far in it."""
@@ -145,78 +132,94 @@ class _Search:
         return self.folds.extended(found.columns, found.precision)
 
     @staticmethod
-    def _leaders(ranked: Sequence[tuple[float, Term]]) -> list[tuple[float, Term]]:
+    def _leaders(ranked: Sequence[tuple[float, Term]]) -> list[Term]:
         """The best of every kind of term at every spot, as far as they are near the best of all."""
-        out: dict[tuple[object, ...], tuple[float, Term]] = {}
+        out: dict[tuple[object, ...], Term] = {}
         for gain, term in ranked:
             if gain < 0.4 * ranked[0][0] or len(out) >= 3 * REFINED:
                 break
-            out.setdefault(term.kind, (gain, term))
-        shaped = [each for each in out.values() if each[1].form.shape][:REFINED]
-        plain = [each for each in out.values() if not each[1].form.shape]
-        return [*shaped, *plain]
+            out.setdefault(term.kind, term)
+        shaped = [term for term in out.values() if term.form.shape][:REFINED]
+        return [*shaped, *(term for term in out.values() if not term.form.shape)]
 
     def _refined(self, step: Folds, term: Term) -> tuple[float, Term]:
         """(log density on withheld parts less what shapes cost, term with the shape that the data want)."""
         term = self.shapes.followed(step, term)
         white, size = self.shapes.columns(term)
-        return withheld(gains(*step.together([white]), size)) - self._costs([term]), term
+        return withheld(gains(*step.together([white]), size)) - self._cost(term), term
 
-    def _costs(self, terms: Sequence[Term]) -> float:
-        """Log odds against terms: their kinds are equally likely, and shapes were looked for among many."""
-        return sum(EQUAL_LOG_ODDS * len(t.form.shape) + self.per_term for t in terms)
+    def _cost(self, term: Term) -> float:
+        """Log odds against a term: all kinds are equally likely, and a shape was looked for among many."""
+        return EQUAL_LOG_ODDS * len(term.form.shape) + self.per_term
 
-    # -- sets ----------------------------------------------------------------------------------------------------------
-
-    def _score(self, terms: Sequence[Term]) -> float:
-        return self._scores(terms)(range(len(terms)))
-
-    def _scores(self, terms: Sequence[Term]) -> Callable[[Sequence[int]], float]:
-        """Function of term numbers: log density on withheld parts minus the cost of these terms."""
+    def _sets(self, terms: Sequence[Term]) -> _TermSets:
         found = fitted(self.shapes, terms, self.folds)
-        G, h = self.folds.together(found.columns)
-        own = found.by_term(np.arange(float(len(found.precision))))
+        return _TermSets(found, self.folds.together(found.columns), [self._cost(t) for t in terms])
 
-        def score(some: Sequence[int]) -> float:
-            at = np.concatenate([own[i] for i in some]).astype(int)
-            gain = withheld(gains(G[:, at][:, :, at], h[:, at], found.precision[at]))
-            return gain - self._costs([terms[i] for i in some])
+    def _best_set(self, pool: Sequence[Term]) -> tuple[Term, ...]:
+        return tuple(pool[i] for i in simplest(search_sets(self._sets(pool)), pool))
 
-        return score
-
-    def _exhaustive(self, chosen: list[Term], pool: Sequence[Term], score: float) -> list[Term]:
-        """The best of all sets of up to three terms of the pool, where it exceeds the chosen set by the margin."""
-        terms = list(dict.fromkeys([*chosen, *sorted(pool, key=lambda t: -self._score([t]))]))[
-            : max(2 * REFINED, len(chosen))
-        ]
-        of = self._scores(terms)
-        best, value = chosen, score
-        for count in (1, 2, 3):
-            for some in combinations(range(len(terms)), count):
-                gain, tried = of(some), [terms[i] for i in some]
-                if gain > value + margin(tried, best):
-                    best, value = tried, gain
-        return best
-
-    def _without_idle(self, chosen: list[Term]) -> list[Term]:
-        """The terms that move the tip by MINOR of the noise floor, or the largest one."""
-        while len(chosen) > 1:
-            size = list(strengths(self.bench, fitted(self.shapes, chosen, self.folds)))
-            if min(size) > (MINOR * self.floor_mm) ** 2:
-                break
-            chosen.pop(int(np.argmin(size)))
+    def _with_constants(self, chosen: tuple[Term, ...]) -> tuple[Term, ...]:
+        """The terms, and a constant per spot where it makes withheld parts clearly more probable."""
+        for spot in dict.fromkeys(t.spot for t in chosen if isinstance(t.form, Form)):
+            n, more = len(chosen), (*chosen, Term(spot, CONSTANT))
+            sets = self._sets(more)
+            if sets.value(range(n + 1)) > sets.value(range(n)) + EQUAL_LOG_ODDS:
+                chosen = more
         return chosen
 
-    def _answer(self, chosen: list[Term], pool: Sequence[Term]) -> FoundLaw:
-        own, others = len(chosen), [each for each in dict.fromkeys(pool) if each not in chosen]
-        of = self._scores([*chosen, *others])
-        gain = of(range(own))
-        alike = []
+    def _by_size(self, chosen: Sequence[Term]) -> tuple[Term, ...]:
+        """The terms that move the tip by MINOR of the noise floor, or the largest one; the largest first."""
+        size = dict(zip(chosen, strengths(self.bench, fitted(self.shapes, chosen, self.folds)), strict=True))
+        order = sorted(chosen, key=lambda t: -size[t])
+        return (order[0], *(t for t in order[1:] if size[t] > (MINOR * self.floor_mm) ** 2))
+
+    def _answer(self, chosen: Sequence[Term], pool: Sequence[Term]) -> FoundLaw:
+        own, others = len(chosen), [each for each in pool if each not in chosen]
+        sets, alike = self._sets([*chosen, *others]), []
+        least = sets.value(range(own)) - EQUAL_LOG_ODDS
         for i, term in enumerate(chosen):
+            rest = [j for j in range(own) if j != i]
             instead = [(j, other) for j, other in enumerate(others, own) if other.kind != term.kind]
-            same = [other for j, other in instead if of([*range(i), j, *range(i + 1, own)]) > gain - EQUAL_LOG_ODDS]
-            alike.append(tuple(same))
+            alike.append(tuple(other for j, other in instead if sets.value([*rest, j]) > least))
         return replace(fitted(self.shapes, chosen, self.folds), alike=tuple(alike))
+
+
+class _TermSets:
+    """Sets of terms by their log density on withheld parts less what they cost; of a spot one map at most."""
+
+    def __init__(self, found: FoundLaw, data: tuple[Floats, Floats], costs: Sequence[float]) -> None:
+        self.data, self.costs, self.precision = data, costs, found.precision
+        self.own = [own.astype(int) for own in found.by_term(np.arange(float(len(found.precision))))]
+        self.usable = range(len(costs))
+        self.candidates = [
+            PlacedCause(f"map {t.spot}" if isinstance(t.form, SmoothForm) else f"term {i}", None, ())
+            for i, t in enumerate(found.terms)
+        ]
+
+    def value(self, members: Sequence[int]) -> float:
+        if not members:
+            return 0.0
+        on, (G, h) = np.concatenate([self.own[i] for i in members]), self.data
+        gain = withheld(gains(G[:, on][:, :, on], h[:, on], self.precision[on]))
+        return gain - sum(self.costs[i] for i in members)
+
+    def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
+        return np.array([self.value((*members, i)) for i in more])
+
+
+def simplest(sets: Mapping[Members, float], terms: Sequence[Term]) -> Members:
+    """Of the sets that explain as well as the best one, by less than EQUAL_LOG_ODDS, the one of the fewest and simplest terms."""
+
+    def complexity(members: Members) -> tuple[float, ...]:
+        own = [terms[i] for i in members]
+        uncommon = sum(t.form.family not in _PLAIN for t in own)
+        return (
+            len(own), uncommon, sum(len(t.form.shape) for t in own), sum(map(unlikely, own)), -sets[members]
+        )  # fmt: skip
+
+    least = max(sets.values()) - EQUAL_LOG_ODDS
+    return min((m for m, value in sets.items() if value > least), key=complexity)
 
 
 def strengths(bench: TermRows, found: FoundLaw) -> Iterator[float]:
@@ -226,51 +229,9 @@ def strengths(bench: TermRows, found: FoundLaw) -> Iterator[float]:
         yield float(bench.rms(term.spot, values)[0]) ** 2
 
 
-def margin(tried: Sequence[Term], best: Sequence[Term]) -> float:
-    """Log density by which a set has to be more probable than another: fewer terms and fewer shapes go before."""
-    shapes = [sum(len(t.form.shape) for t in terms) for terms in (tried, best)]
-    if len(tried) < len(best):
-        return -EQUAL_LOG_ODDS
-    return EQUAL_LOG_ODDS if shapes[0] > shapes[1] else 0.5
-
-
 def unlikely(term: Term) -> bool:
     """Of a drive that leads one axis of the tip: what follows its own travel, or acts for a while, is its own; else the
     tip's, that too which follows a drive's load where that is the force along an axis.
     """
     own = term.form.family == "while" or term.form.about[0].startswith(("act", *"xyz"))
     return (term.spot.on == "drive") != own
-
-
-def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundLaw | None:
-    """The smooth maps that the residual of a kind of channel follows: cubic splines over one or two covariates.
-
-    Covariates and spots make withheld parts most probable, one spot after the other; None where none gains EQUAL_LOG_ODDS.
-    """
-    where, shapes, step = spots(len(bench.bench.actuators), kind), Shapes(bench), folds
-    chosen: list[Term] = []
-    while len(chosen) < len(where):
-        best: tuple[float, Term] | None = None
-        for spot in [s for s in where if all(s != each.spot for each in chosen)]:
-            size = bench.sizes(spot)
-            for names in _covariates(spot, size):
-                counts = (2 * ORDERS,) if len(names) == 1 else (ORDERS, ORDERS)
-                form = SmoothForm(about=names, limits=tuple(size.limits[n] for n in names), counts=counts)
-                white, precision = shapes.columns(Term(spot, form))
-                gain = withheld(gains(*step.together([white]), precision))
-                if best is None or gain > best[0]:
-                    best = gain, Term(spot, form)
-        if best is None or best[0] < EQUAL_LOG_ODDS:
-            break
-        chosen.append(best[1])
-        found = fitted(shapes, chosen, folds)
-        step = folds.extended(found.columns, found.precision)
-    return found if chosen else None
-
-
-def _covariates(spot: Spot, size: Sizes) -> list[tuple[str, ...]]:
-    if spot.on in ("control", "drive"):
-        return [("act_mm",)] if size.wide("act_mm") else []
-    axes = [f"{a}_mm" for a in "xyz" if size.wide(f"{a}_mm")]
-    pairs = [(a, b) for i, a in enumerate(axes) for b in axes[i + 1 :]]
-    return [*pairs, *((a,) for a in axes), *((name,) for name in _SINGLE if size.wide(name))]

@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from camcomp.diagnosis.model.discrepancy import ORDERS
 from camcomp.ground.datatypes import Floats
 from camcomp.model.law.covariates import is_load, load_of
 
@@ -15,6 +16,7 @@ MOST_WAVES = 240  # periods of one covariate that are tried
 HARD_MM = 0.02  # a reversal that is over at once
 _CENTRES, _MOMENTS = 13, 40
 _LASTS = (0.5, 1.0, 2.0, 4.0, 8.0)  # s that something acts for
+_MAPPED = ("x_mm", "y_mm", "z_mm", "heading_rad", "temp_C", "cut_min", "fx_N", "fy_N", "fz_N")  # alone in a map
 Bounds = tuple[tuple[float, float], ...]
 
 
@@ -156,12 +158,12 @@ def _times(size: Sizes) -> Iterator[Form]:
     low, high = size.limits["common_s"]
     span, name = max(high - low, 1e-9), "common_s"
     yield from _powers(name, "s", 2)
-    step, during = "step(common_s - {0})", "step(common_s - {0})*step({0} + {1} - common_s)"
+    step, during = "step(common_s - {0})", "step(common_s - {0})*step({1} - common_s)"
     for a, b in size.stretches:
         for moment in np.linspace(a, b, max(_MOMENTS // len(size.stretches), 6))[1:-1]:
             yield _one("step", name, step, "", (float(moment),), bounds=((a, b),))
             for last in _LASTS:
-                yield _one("while", name, during, "", (float(moment), last), bounds=((a, b), (0.2, 30.0)))
+                yield _one("while", name, during, "", (float(moment), min(moment + last, b)), bounds=((a, b), (a, b)))
     for a, _ in size.stretches[1:]:
         yield _one("step", name, step, "", (a,), bounds=((low, high),))
     for share in (0.1, 0.3, 1.0):
@@ -237,3 +239,15 @@ def _loads(size: Sizes) -> Iterator[Form]:
             yield _one("force", name, name, unit)
         yield _one("force squared", name, f"{name}*abs({name})", square)
         yield from (_one("force power", name, f"{name}^{k}", per) for k, per in ((2, square), (3, cube)))
+
+
+def smooth_forms(size: Sizes, *, at_tip: bool) -> list[SmoothForm]:
+    """Maps over one or two covariates, of the tip or of an actuator."""
+    pairs = list(combinations([f"{a}_mm" for a in "xyz" if size.wide(f"{a}_mm")], 2)) if at_tip else []
+    single = [(name,) for name in (_MAPPED if at_tip else ("act_mm",)) if size.wide(name)]
+    return [
+        SmoothForm(
+            about=names, limits=tuple(size.limits[n] for n in names), counts=(2 * ORDERS // len(names),) * len(names)
+        )
+        for names in (*pairs, *single)
+    ]

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term
-from camcomp.diagnosis.law.find import margin, unlikely
+from camcomp.diagnosis.law.find import simplest, unlikely
 from camcomp.diagnosis.law.forms import Sizes, at_drive, at_tip
 from camcomp.diagnosis.law.library import LearnedLaw, keep, learned
 from camcomp.diagnosis.result.types import Law, LawPart, LawTerm
@@ -101,11 +101,13 @@ def test_of_a_force_at_the_tip_and_the_load_of_a_drive_that_is_the_same_the_tip_
     assert unlikely(Term(Spot("drive", 0), load)) and not unlikely(Term(Spot("structure", 0), force))
 
 
-def test_of_sets_that_explain_alike_the_one_with_fewer_shapes_goes_before():
+def test_of_sets_that_explain_alike_the_one_of_fewer_and_simpler_terms_goes_before():
     forms, spot = at_tip(sizes(AT_TIP)), Spot("structure", 0)
-    wave, power = (Term(spot, next(f for f in forms if f.family == family)) for family in ("wave", "power"))
-    assert margin([wave], [power]) > margin([power], [wave]) > 0.0  # else a parabola is a piece of a long wave
-    assert margin([wave], [power, power]) < 0.0
+    terms = [Term(spot, next(f for f in forms if f.family == family)) for family in ("wave", "power", "line")]
+    assert simplest({(): 0.0, (0,): 12.0, (1,): 10.0}, terms) == (1,)  # else a parabola is a piece of a long wave
+    assert simplest({(): 0.0, (0,): 12.0, (1, 2): 14.0}, terms) == (0,)
+    assert simplest({(): 0.0, (0,): 12.0, (1, 2): 16.0}, terms) == (1, 2)
+    assert simplest({(): 0.0, (0,): 2.0}, terms) == ()
 
 
 def test_splines_add_up_to_one_and_stay_within_their_limits():
