@@ -68,8 +68,7 @@ def load(name: str, given: ObjectCode) -> Run:
 
     environment = _link()({})
     environment.consts.extend(given.constants)
-    target = llvm.Target.from_default_triple().create_target_machine(opt=0, jit=True, codemodel="jitdefault")
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target)
+    engine = _engine()
     engine.add_object_file(llvm.ObjectFileRef.from_data(given.code))
     engine.finalize_object()
     at = engine.get_function_address(given.wrapper)
@@ -78,8 +77,17 @@ def load(name: str, given: ObjectCode) -> Run:
         raise ValueError(f"no {name} in its object file")
     ctypes.c_void_p.from_address(place).value = id(environment)
     run: Any = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)(at)
-    run.engine, run.environment = engine, environment  # their memory is used
+    run.environment = environment  # its memory is used
     return run
+
+
+@functools.cache
+def _engine() -> Any:
+    """The engine that links all object files; its memory holds their code."""
+    import llvmlite.binding as llvm
+
+    target = llvm.Target.from_default_triple().create_target_machine(opt=0, jit=True, codemodel="jitdefault")
+    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), target)
 
 
 @functools.cache
