@@ -14,7 +14,7 @@ from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.bands.tip_field import tip_field_of
 from camcomp.compensation.program import division
 from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of, times_of
-from camcomp.compensation.program.division import COARSE_MM, Bend, Nodes, second_derivative, trial_nodes
+from camcomp.compensation.program.division import Bend, Nodes, second_derivative, trial_nodes
 from camcomp.compensation.program.judged_points import (
     Division,
     JudgedPoints,
@@ -24,7 +24,7 @@ from camcomp.compensation.program.judged_points import (
     see_original,
     whole_pose,
 )
-from camcomp.compensation.program.line_ends import cut_at, cut_at_knots, cut_at_stops, pieces_between, points_inside
+from camcomp.compensation.program.line_ends import cut_at, pieces_between, points_inside, trial_spacing
 from camcomp.compensation.program.moves import (
     chord_budget,
     corrected_pieces,
@@ -33,7 +33,7 @@ from camcomp.compensation.program.moves import (
     without_shared_ends,
 )
 from camcomp.compensation.program.orienting import MOST_TILT_RAD, Orienting, refuse_unfollowed
-from camcomp.compensation.program.play import cut_at_reversals, load_turns, turns_warning
+from camcomp.compensation.program.play import cut_for_drives, load_turns, turns_warning
 from camcomp.compensation.program.posture import check_posture
 from camcomp.compensation.program.programmed import Programmed
 from camcomp.compensation.program.result import Interpolation
@@ -63,8 +63,6 @@ from camcomp.model.statics.target import Correction
 MAX_ROUNDS, ARC_ROUNDS = 6, 4
 STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
 WITH_SHARES = 0.7  # of the tolerance at the points looked at: where the share bends, more is missed between them
-FINE_MM = 0.5  # distance of trial points on straight lines with effects
-SHARE_OF_WAVE = 0.15  # between them, at most: no row of points meets a wave at its zeros alone
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -148,7 +146,7 @@ class _Correction:
     began_min: float
 
     def __post_init__(self) -> None:
-        program, job, spacing = self.program, self.job, _spacing(self.job)
+        program, job, spacing = self.program, self.job, trial_spacing(self.job)
         self.step = program.step_mm(job.config.control.resolution_mm)
         base = replace(lay_track(program.path, job.conditions, self.engaged), began_min=self.began_min)
         self.orienting = Orienting.of(program, job)
@@ -156,10 +154,7 @@ class _Correction:
             refuse_unfollowed(job, self.method, self.part)
         self.turns = load_turns(job, base)
         turned = cut_at(base, [(i, at) for i, *ends in self.turns for at in ends])
-        knotted = cut_at_knots(job, turned, spacing)
-        track, reversals = cut_at_reversals(job, knotted, spacing)
-        track = cut_at_stops(job, track)
-        turning = pieces_between(knotted, track, reversals)
+        track, turning = cut_for_drives(job, turned)
         self.shares = shares_of(job, base)
         if self.shares is not None:
             track, of = self.shares.divided(self.shares.with_jumps(track))
@@ -427,12 +422,6 @@ class _Aimed:
     commanded: Floats  # (k, 3) program frame
     iterations: int
     words: Floats  # (k, 3) of the orientation, zero where the program states none
-
-
-def _spacing(job: Job) -> float:
-    """Distance of trial points, mm: a screw's error has waves of a few mm, the scale of an encoder shorter ones."""
-    waves = [SHARE_OF_WAVE * each for each in (cause.values.get("pitch_mm", 0.0) for cause in job.causes) if each > 0.0]
-    return min([FINE_MM, *waves]) if job.causes else COARSE_MM
 
 
 def _kept(track: Track, nodes: Nodes, correction: Floats, half: float) -> Bools:

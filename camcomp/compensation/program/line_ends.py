@@ -20,12 +20,20 @@ from camcomp.model.job import Job
 from camcomp.model.signal_path import acting
 from camcomp.model.statics.solve import inverse
 
+FINE_MM = 0.5  # distance of trial points on straight lines with effects
+SHARE_OF_WAVE = 0.15  # between them, at most: no row of points meets a wave at its zeros alone
 LOOP_MM = 1.0  # between points at which set-points of long lines are looked at
 LEADING_MM = 5e-4  # of a line that takes up the lag of a loop beside a stop; the tip misses half of that
 LEAST = 1e-6  # of a piece: places nearer to each other or to its ends are one
 
 Place = tuple[int, float]  # piece, fraction of it
 Span = tuple[int, float, float]  # piece, fractions of it at begin and end
+
+
+def trial_spacing(job: Job) -> float:
+    """Distance of trial points, mm: a screw's error has waves of a few mm, the scale of an encoder shorter ones."""
+    waves = [SHARE_OF_WAVE * each for each in (cause.values.get("pitch_mm", 0.0) for cause in job.causes) if each > 0.0]
+    return min([FINE_MM, *waves]) if job.causes else COARSE_MM
 
 
 def points_along(track: Track, spacing: float = COARSE_MM) -> tuple[Ints, Floats]:

@@ -19,7 +19,16 @@ import math
 
 import numpy as np
 
-from camcomp.compensation.program.line_ends import Place, Span, cut_at, points_along
+from camcomp.compensation.program.line_ends import (
+    Place,
+    Span,
+    cut_at,
+    cut_at_knots,
+    cut_at_stops,
+    pieces_between,
+    points_along,
+    trial_spacing,
+)
 from camcomp.compensation.program.moves import corrected_pieces, travel_of
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
@@ -37,6 +46,15 @@ SPACING_MM = 2.0  # between the points at which loads are looked at
 STANDS = 0.999  # share of its drive's way that a carriage stays behind, from which on it stands
 LOOKS = 2  # each begins where the one before has found the bends
 NEAR = 1e-3  # of the way between two points, that are one
+
+
+def cut_for_drives(job: Job, track: Track) -> tuple[Track, Bools]:
+    """The track cut where effects of drives and loops need the end of a line, and pieces in which a drive goes through its play."""
+    spacing = trial_spacing(job)
+    knotted = cut_at_knots(job, track, spacing)
+    reversing, lines = cut_at_reversals(job, knotted, spacing)
+    divided = cut_at_stops(job, reversing)
+    return divided, pieces_between(knotted, divided, lines)
 
 
 def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, set[Span]]:

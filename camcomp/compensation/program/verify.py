@@ -15,16 +15,17 @@ import numpy as np
 from camcomp.compensation.bands.outcome import BandTotals, band_figures
 from camcomp.compensation.bands.tip_field import tip_field_of
 from camcomp.compensation.program.division import trial_nodes
-from camcomp.compensation.program.line_ends import LOOP_MM, cut_at_stops, is_late
+from camcomp.compensation.program.line_ends import LOOP_MM, is_late
 from camcomp.compensation.program.matching import Matching
 from camcomp.compensation.program.moves import (
     WITHIN_RAPID,
     corrected_pieces,
     refuse_unsolved,
     row_layout,
+    without_shared_ends,
 )
 from camcomp.compensation.program.orienting import Orienting
-from camcomp.compensation.program.play import load_turns, passed_turns
+from camcomp.compensation.program.play import cut_for_drives, load_turns, passed_turns
 from camcomp.compensation.program.programmed import Programmed
 from camcomp.compensation.program.result import ErrorSum, LineResult, Verification
 from camcomp.compensation.program.uncertainty import shares_of, tip_moves
@@ -83,7 +84,9 @@ class Verified:
 
 def verify(corrected: Program, original: Program, job: Job) -> Verified:
     """Residual of a corrected program. Raises CheckFailed CC604 when it is not one of this original."""
-    track = cut_at_stops(job, lay_track(original.path, job.conditions, job.engaged(original)))
+    track = lay_track(original.path, job.conditions, job.engaged(original))
+    if is_late(job):
+        track, _ = cut_for_drives(job, track)
     shares = shares_of(job, track)
     if shares is not None:
         track = shares.with_jumps(track)
@@ -157,7 +160,8 @@ class _Original(Programmed):
             return begin, end
         long = corrected_pieces(track.path, track) & (track.length > LOOP_MM)
         nodes = trial_nodes(track.length, self._angle(), long, LOOP_MM)
-        out = self._commanded(nodes.piece, nodes.w)
+        piece, w, of = without_shared_ends(track, nodes.piece, nodes.w)
+        out = self._commanded(piece, w).take(of, axis=0)
         return out[nodes.first[:-1]], out[nodes.first[1:] - 1]
 
     def _commanded(self, piece: Ints, w: Floats) -> Floats:

@@ -135,3 +135,16 @@ def test_a_lag_is_led_behind_and_in_front_of_stops_too(tmp_path, time_constant_m
     assert 1e3 * np.linalg.norm(result.after, axis=1).max() <= 1.1
     checked = verify(read_program(result.written.data, name="out.nc"), result.program, job)
     assert max(each.residual_um for each in checked.lines if each.line != 5) < verified_um
+
+
+def test_verify_finds_what_is_left_of_a_late_drive_with_play(tmp_path):
+    """Its lines at reversals are those that the correction made."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 1200)
+    circle = "".join(f"X{x:.4f} Y{y:.4f}\n" for x, y in zip(22.0 * np.cos(angles), 22.0 * np.sin(angles), strict=True))
+    (tmp_path / "in.nc").write_text(f"G21 G90 G17 G94\nG0 X22 Y0 Z5\nG1 Z0 F300\nF1200\n{circle}M2\n")
+    effect = "{effect: servo_lag, time_constant_ms: 5}, {effect: backlash, target: x, width_mm: 0.02}"
+    result, job = done(tmp_path, effect, tmp_path / "in.nc")
+    stated = 1e3 * np.linalg.norm(result.after, axis=1).max()
+    checked = verify(read_program(result.written.data, name="out.nc"), result.program, job)
+    assert stated < 1.0
+    assert abs(1e3 * checked.residual.max() - stated) < 0.3
