@@ -139,7 +139,7 @@ class RobotReader:
     # --- the path ----------------------------------------------------------------------------------------------
 
     def program(self) -> Program:
-        """What was read. Raises ProgramError CC100, CC112 and CC115."""
+        """The program that was read. Raises ProgramError CC100, CC112 and CC115."""
         m, text = self.moves, self.text
         n = len(m.kind)
         if n == 0:

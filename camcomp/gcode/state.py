@@ -69,7 +69,7 @@ class ControlState:
         self.update()
 
     def copy(self) -> "ControlState":
-        """The state at this moment; what does not change is shared."""
+        """The state at this moment; parts that stay the same are shared."""
         out = copy(self)
         for name, value in vars(self).items():
             if isinstance(value, dict):

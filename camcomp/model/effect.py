@@ -66,7 +66,7 @@ class Parameter:
         return float(np.log(value / self.nominal)) if self.log else value - self.nominal
 
     def on_top(self, before: float, found: float) -> float:
-        """Value of what is found on top of a stated one: sum, product for factors; a shape is as it is found."""
+        """Value of a finding on top of a stated value: sum, product for factors; a shape is as it is found."""
         return found if self.shape else self.value(self.coordinate(before) + self.coordinate(found))
 
 

@@ -215,7 +215,7 @@ class Field:
         return np.where(self.machine.revolute, 1000.0, 1.0)
 
     def mark(self, tile: Ints) -> None:
-        """Count tiles (n,), negative ones left out, as used."""
+        """Count tiles (n,) as used; negative numbers are none."""
         self.used = np.append(self.used, np.zeros(len(self.tiles.half) - len(self.used), np.bool_))
         self.used[tile[tile >= 0]] = True
 

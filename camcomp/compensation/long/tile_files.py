@@ -22,7 +22,7 @@ MOST_FILES = 16
 
 
 class TileFiles:
-    """The files of one machine; without a folder that is only the user's, or with a damaged file, nothing is kept."""
+    """The cubes of one machine on disk, in a folder that only the user can change; a damaged file counts as missing."""
 
     def __init__(self, machine: Machine) -> None:
         own = Path(__file__).with_name("field.py")

@@ -228,7 +228,7 @@ class _Correction:
         return _Aimed(asked.taken(nodes.piece, nodes.w, out), int(result.iterations[points].max(initial=0)), words)
 
     def _aim_at_others(self, nodes: Nodes) -> _Aimed:
-        """`_aim`, where drives have no memory without those nodes that were trial points."""
+        """`_aim`; the targets of trial points are known already where drives have no memory."""
         known = self.aimed
         at, fresh = nodes.among(self.trial)
         if not len(fresh) and len(nodes.w) == len(self.trial.w):

@@ -57,7 +57,7 @@ class Programmed:
         return target + self.shares.at(self.track, piece, w)[:, None] * (commanded - target)
 
     def missed(self, error: Floats, piece: Ints, w: Floats, travel: Travel, before: Floats | None = None) -> Floats:
-        """Errors (k, 3) mm without those that the policy accepts, NaN without a solution; without a policy the errors themselves."""
+        """Errors (k, 3) mm beyond those that the policy accepts; NaN where the machine has no solution."""
         if self.shares is None:
             return error
         target = self.track.points(piece, w)

@@ -297,7 +297,7 @@ class _Points:
         return totals
 
     def by_line(self, w: Floats, judged: Bools, residual: Floats, missed: Floats | None) -> list[LineResult]:
-        """Results by source line, of residuals (k,) and of what is missed (j,) at the judged points, mm."""
+        """Results by source line, of residuals (k,) and of those beyond the policy (j,) at the judged points, mm."""
         job, track, program = self.asked.job, self.asked.track, self.asked.program
         piece, residual, vertex, w = self.piece[judged], residual[judged], self.f[judged] == 1.0, w[judged]
         target, travel = track.points(piece[vertex], w[vertex]), self.asked.travel(piece[vertex], w[vertex])

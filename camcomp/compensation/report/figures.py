@@ -74,7 +74,7 @@ class DrawnPath:
         return [line(name, s, y, i) for i, (name, y) in enumerate(zip(names, shown, strict=True))]
 
     def errors(self, values: Floats, *names: str) -> list[Json]:
-        """Curves of errors (N, k) um on a logarithmic axis; the last column is what the control drives."""
+        """Curves of errors (N, k) um on a logarithmic axis; the last column is the path that the controller drives."""
         return self.curves([*names, f"corrected, as the control drives it in {self.mode}"], values, 6, FLOOR_UM)
 
     def in_space(self, index: Ints, gap: Bools, **more: Any) -> Json:

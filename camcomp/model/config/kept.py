@@ -30,7 +30,7 @@ _OWN = ("model/config", "forces", "robots")  # folders whose code decides what a
 
 
 class KeptConfig:
-    """The kept configuration of machine files; without a folder that is only the user's, nothing is kept."""
+    """The configuration of machine files on disk, in a folder that only the user can change."""
 
     def __init__(self, texts: Texts) -> None:
         self._key = [hashlib.sha256(data).hexdigest() for _, data in texts]
@@ -41,7 +41,7 @@ class KeptConfig:
                 self._files = CodeFiles(folder, "machine", _state())
 
     def load(self) -> Config | None:
-        """The configuration without its tree, or None."""
+        """The kept configuration, if there is one; it lacks the tree."""
         with suppress(Exception):  # a damaged file counts as none
             text = None if self._files is None else self._files.load(self._key)
             config = None if text is None else _read(json.loads(text))
@@ -49,7 +49,7 @@ class KeptConfig:
         return None
 
     def save(self, tree: Node, config: Config) -> None:
-        """Keep the configuration of a tree that nothing else decides about, and the newest MOST_FILES files."""
+        """Keep a configuration that its tree alone determines, and the newest MOST_FILES files."""
         if self._files is None or not _stands_alone(tree, config):
             return
         with suppress(OSError, FileError, TypeError):  # TypeError: a plug-in of the user
@@ -58,7 +58,7 @@ class KeptConfig:
 
 
 def _stands_alone(tree: Node, config: Config) -> bool:
-    """Whether nothing but its tree decides about a configuration, and the specs hold all of it."""
+    """Whether its tree alone determines a configuration, and the specs hold all of it."""
     dialect = config.control.dialect
     names_file = any(name.endswith("file") for name, _ in leaves(tree))
     more = names_file or config.spreads or config.doubts or config.effects

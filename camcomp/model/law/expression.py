@@ -58,7 +58,7 @@ def since(u: Floats) -> Floats:
 
 
 def washout(time: Floats, u: Floats, constant: float) -> Floats:
-    """What is left of u (n,) or (n, q) at times (n,) s, each change of which fades with a time constant, s; 0 at the start."""
+    """High-pass of u (n,) or (n, q) at times (n,) s: every change fades with a time constant, s; 0 at the start."""
     u = np.broadcast_to(u, (len(time), *u.shape[1:]))
     return np.asarray(u - first_order(u.reshape(len(time), -1), time, max(constant, 1e-9)).reshape(u.shape))
 

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 @findings_options("sarif", "junit")
 @quiet_option
 def command(
+    *,
     paths: tuple[str, ...],
     configs: tuple[str, ...],
     output_dir: str,

@@ -62,6 +62,7 @@ LEAST_FIGURE = 1e-8  # mm, rad, N or N mm: smaller figures are rounding errors o
 @click.option("--dry-run", is_flag=True, help="Do everything but write.")
 @quiet_option
 def command(
+    *,
     program: str,
     configs: tuple[str, ...],
     output: str | None,

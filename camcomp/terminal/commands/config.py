@@ -37,7 +37,7 @@ def show(configs: tuple[str, ...], origin: bool) -> None:
 @click.option("--comp-type", type=click.Choice(["0", "1"]), default="0", show_default=True, help="COMP_FILE_TYPE.")
 @click.option("-o", "--output", metavar="FILE", type=OUTPUT, help="The file; default and -: standard output.")
 def screw_file(
-    configs: tuple[str, ...], actuator: str, start: float, end: float, step: float, control: str, comp_type: str,
+    *, configs: tuple[str, ...], actuator: str, start: float, end: float, step: float, control: str, comp_type: str,
     output: str | None,
 ) -> None:  # fmt: skip
     """Write a control's table for the effects in one drive: pitch, wobble, play, error table.

@@ -41,6 +41,7 @@ from camcomp.terminal.progress import say, working
 )
 @quiet_option
 def command(
+    *,
     experiment: str,
     json_file: str | None,
     report: str | None,

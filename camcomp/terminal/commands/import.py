@@ -41,7 +41,7 @@ from camcomp.terminal.progress import say, working
 @click.option("--holdout", multiple=True, metavar="RUN", help="Run that is judged and never fitted; repeatable.")
 @click.option("--rows", type=click.IntRange(min=12), help="At most so many rows of every table, spread evenly.")
 def command(
-    files: tuple[str, ...], configs: tuple[str, ...], output_dir: str, actuator: str | None, columns: tuple[str, ...],
+    *, files: tuple[str, ...], configs: tuple[str, ...], output_dir: str, actuator: str | None, columns: tuple[str, ...],
     names: tuple[str, ...], period_s: float | None, degrees: bool | None, by: str | None, programs: tuple[str, ...], cutting: bool,
     one_clamping: bool, holdout: tuple[str, ...], rows: int | None,
 ) -> None:  # fmt: skip

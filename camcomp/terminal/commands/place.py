@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 @stock_option
 @quiet_option
 def command(
-    program: str, configs: tuple[str, ...], x_mm: tuple[float, float] | None, y_mm: tuple[float, float] | None, steps: int,
+    *, program: str, configs: tuple[str, ...], x_mm: tuple[float, float] | None, y_mm: tuple[float, float] | None, steps: int,
     turns: tuple[float, ...], json_file: str | None, report: str | None, stock: "StockChoice | None", quiet: bool,
 ) -> None:  # fmt: skip
     """Find where on the table a program is cut best: with the least error that compensation cannot be trusted to remove.

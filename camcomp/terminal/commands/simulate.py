@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 @click.option("--started-s", type=float, default=0.0, help="Start on the common clock, for effects of warming up.")
 @quiet_option
 def command(
+    *,
     program: str,
     configs: tuple[str, ...],
     output: str | None,

@@ -31,6 +31,7 @@ _NOT_COMPENSATED = "the program has no stamp of camcomp compensate: compensate i
 @stock_option
 @click.option("--tolerance-um", type=click.FloatRange(min=1e-6), help="Largest residual that passes.")
 def command(
+    *,
     corrected: str,
     original: str,
     configs: tuple[str, ...],
