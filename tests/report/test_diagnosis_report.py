@@ -69,7 +69,7 @@ def test_what_may_be_a_part_of_something_unknown_is_not_called_identified():
 
 def test_causes_with_intervals_next_experiment_and_notes():
     text = words(html_of("ambiguous", notes=["run b has no temperature"]))
-    assert "backlash x 97.0 % 90 % width 21.3 µm (19.2 to 23.4)" in text
+    assert "backlash (x): play in the drive" in text and "width 21.3 µm (19.2 to 23.4) 97.0 % 90 %" in text
     assert "Repair nothing yet" in text and "play in the drive" in text
     assert (
         "Mill the circle in air at 2000 mm/min. It separates backlash(x) and friction(x): 0.830 bits expected." in text
@@ -197,12 +197,13 @@ def test_the_next_program_stands_on_the_page_ready_to_be_saved():
 def test_the_first_part_says_what_to_do():
     text = words(html_of("identified"))
     at = [
-        text.index(each)
-        for each in ("What to do What stays after a repair", "adjust the preload", "Causes by probability")
+        text.index(each) for each in ("What to do What stays after a repair", "adjust the preload", "Shrinkage ladder")
     ]
     assert at == sorted(at)
     assert "Nothing: machine and model agree" in words(html_of("none"))
-    assert "none of the effects that camcomp knows" in words(html_of("unknown"))
+    unknown = words(html_of("unknown"))
+    assert "none of the effects that camcomp knows" in unknown
+    assert re.search(r"unknown \(y\): none of the effects of the library \d+\.\d % \d+ %", unknown)
 
 
 def test_where_no_cause_takes_anything_no_curve_says_so():
@@ -222,5 +223,5 @@ def test_the_law_of_an_unknown_effect_stands_on_the_first_screen():
     unknown = {"effect": "unknown", "target": "y", "probability": 0.99, "share": 0.9, "parameters": {}, "law": law}
     found = DiagnosisResult.model_validate(result("unknown").model_dump() | {"causes": [unknown]})
     text = words(diagnosis_html(found, [], title="e", machine="m").decode())
-    first = text[: text.index("Causes by probability")]
+    first = text[: text.index("It changes nothing in the verdict")]
     assert "2.90 µm was 17.4 µm" in first and "83.3 %" in first and "rises evenly with x_mm" in first

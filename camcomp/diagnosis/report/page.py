@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from camcomp.diagnosis.law.words import listed
-from camcomp.diagnosis.report.answer import by_share, floor_text, probability_text, verdict_text
+from camcomp.diagnosis.report.answer import by_share, floor_text, verdict_text
 from camcomp.diagnosis.report.circles import circles_section
 from camcomp.diagnosis.report.figures import (
     figure_ladder,
@@ -64,7 +64,6 @@ def diagnosis_html(
         Section(name="notes", title="Notes", items=notes) if notes else None,
         _to_do(result, next_program),
         circles_section(views, result.standards.circles),
-        _causes(result),
         None if result.law is None else law_section(result.law, law),
         _apart(result) if len(result.alternatives) > 1 else None,
         _shrinkage(result.shrinkage, floor) if result.shrinkage and result.shrinkage.steps else None,
@@ -124,23 +123,6 @@ def _cards(result: DiagnosisResult) -> list[tuple[str, str, str]]:
     return [*cards, ("Stage", result.where.stage, "where in the machine")]
 
 
-def _causes(result: DiagnosisResult) -> Section:
-    causes = result.causes
-    if not causes:
-        return Section(name="causes", title="Causes", text=["None: the gap is at the noise floor."])
-    rows = []
-    for i, cause in enumerate(causes, 1):
-        rows.append([
-            str(i), cause.effect, cause.target or "–", f"{100 * cause.probability:.1f} %", percent(cause.share), sizes(cause),
-        ])  # fmt: skip
-    heads = ("rank", "effect", "target", "probability", "share of the gap", "parameters with 95 % intervals")
-    return Section(
-        name="causes",
-        title="Causes",
-        tables=[Table("Causes by probability", heads, rows)],
-    )
-
-
 def _apart(result: DiagnosisResult) -> Section:
     items = [listed([each.label for each in one]) for one in result.alternatives]
     return Section(name="apart", title="What cannot be told apart, and why", text=[INDISTINGUISHABLE_TEXT], items=items)
@@ -157,18 +139,20 @@ def _shrinkage(shrink: UnseenShrinkage, floor: float | None) -> Section:
 
 
 def _to_do(result: DiagnosisResult, next_program: Listing | None) -> Section:
-    """Section with the remedy of each cause, and the next experiment."""
+    """Section with every cause and its remedy, and the next experiment."""
+    unknown = [each for each in result.causes if each.effect == UNKNOWN]
     rows: list[Row] = []
-    for cause in by_share(result):
-        share = percent(cause.share) + probability_text(cause.probability)
-        rows.append([f"{cause.label}: {plain(cause)}", sizes(cause), share, remedy(cause)])
-    tables = [Table("Causes and what helps", ("cause", "size", "share of the gap", "what to do"), rows)] if rows else []
+    for cause in (*by_share(result), *unknown):
+        name, probability = f"{cause.label}: {plain(cause)}", f"{100 * cause.probability:.1f} %"
+        rows.append([name, sizes(cause), probability, percent(cause.share), remedy(cause)])
+    heads = ("cause", "size with its 95 % interval", "probability", "share of the gap", "what to do")
+    tables = [Table("Causes and what helps", heads, rows)] if rows else []
     text = [NO_ACTION] if result.verdict == "none" else []
     if result.verdict == "ambiguous":
         text.append(WAIT)
     elif result.known:
         text.append(COMPENSATE)
-    if any(each.effect == UNKNOWN for each in result.causes):
+    if unknown:
         text.append(LOOK)
     if result.law is not None:
         text.append(f"{result.law.says} {PUT_IN}")

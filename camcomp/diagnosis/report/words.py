@@ -6,7 +6,7 @@ import re
 from functools import cache
 from typing import Any
 
-from camcomp.diagnosis.result.types import Driver, Estimate, FoundCause, LawTerm, NamedCause
+from camcomp.diagnosis.result.types import UNKNOWN, Driver, Estimate, FoundCause, LawTerm, NamedCause
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
@@ -39,7 +39,8 @@ def _effect(name: str) -> Any:
 
 def plain(cause: NamedCause) -> str:
     """Name of the effect in a workshop."""
-    return str(getattr(_effect(cause.effect), "PLAIN", cause.effect.replace("_", " ")))
+    usual = "none of the effects of the library" if cause.effect == UNKNOWN else cause.effect.replace("_", " ")
+    return str(getattr(_effect(cause.effect), "PLAIN", usual))
 
 
 def remedy(cause: NamedCause) -> str:
