@@ -13,6 +13,7 @@ from camcomp.diagnosis.statistics.folds import Folds, RunColumns, gains
 from camcomp.ground.datatypes import Floats
 
 FINEST = 0.01  # of the first step of a pattern search: it ends there
+LEAST_GAIN = 0.05  # log evidence by which a neighbour is better
 PHASES = 6  # of a turn between the first row and the last, by which swings that are tried differ
 MOST_APART = 500  # such steps to both sides: runs that are days apart do not count turns
 
@@ -52,8 +53,12 @@ class Shapes:
         size = 1.0
         while size > FINEST:
             tried = [form.at(form.shape + size * way) for way in ways]
-            best = int(np.argmax(self._gains(step, spot, tried)))
-            form, size = tried[best], size if best else size / 3.0
+            gain = self._gains(step, spot, tried)
+            best = int(np.argmax(gain))
+            if gain[best] > gain[0] + LEAST_GAIN:
+                form = tried[best]
+            else:
+                size /= 3.0
         return form
 
     def _between_runs(self, step: Folds, spot: Spot, form: Form) -> Form:

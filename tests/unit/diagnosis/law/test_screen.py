@@ -1,13 +1,15 @@
 """All terms at once: in parts as all together, and rows of several runs as each run alone."""
 
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.law.bench_terms import Spot, TermBench
+from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench
 from camcomp.diagnosis.law.forms import Form
 from camcomp.diagnosis.law.screen import TermGrid, gains_of_terms
+from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.folds import Folds, Split
 
@@ -96,3 +98,23 @@ def test_rows_of_several_runs_have_the_values_of_each_run():
         assert np.array_equal(bench.values(TIPS[0], *FORMS, NOWHERE)[0], together[k])
         bench.runs = Runs().runs
     assert together[0][0, -1] == np.finfo(float).max  # finite, where the formula has no value
+
+
+class Level(Shapes):
+    """Evidence that is the same for all shapes but for rounding, or that some shapes do not have."""
+
+    calls = 0
+
+    def _gains(self, step, spot, forms):
+        self.calls += 1
+        assert self.calls < 100
+        return np.append(1e-9 * np.arange(len(forms) - 1), self.last)
+
+
+@pytest.mark.parametrize("last", [1e-8, np.nan])
+def test_a_shape_that_changes_nothing_stays_and_the_search_ends(last):
+    bench = Runs()
+    bench.sizes = lambda spot: SimpleNamespace(span=lambda name: 50.0)
+    level = Level(bench)
+    level.last = last
+    assert level.followed(None, Term(TIPS[0], WAVES[2])).form == WAVES[2]
