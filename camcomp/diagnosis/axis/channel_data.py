@@ -104,10 +104,10 @@ class ChannelData:
         """The data with the misfit of residuals (n,) of the fitted runs, each row over its noise."""
         return replace(self, misfit=max(float(np.sqrt(np.mean(left**2))) / self.floor, 1.0))
 
-    def where(self, terms: Sequence[AxisCause], at: Sequence[Floats]) -> ChannelData:
+    def where(self, acting: Sequence[tuple[AxisCause, Floats]]) -> ChannelData:
         """The data with the healthy sizes beside causes that act, as they are with amplitudes (d,)."""
-        acting = [(term, own) for term, own in zip(terms, at, strict=True) if own.any()]
-        return replace(self, healthy=[{**own, **self.deflected(k, acting)} for k, own in enumerate(self.healthy)])
+        some = [each for each in acting if each[1].any()]
+        return replace(self, healthy=[{**own, **self.deflected(k, some)} for k, own in enumerate(self.healthy)])
 
     def healthy_columns(self, run: int) -> Floats:
         """Columns (n, q) of healthy sizes of all kinds."""

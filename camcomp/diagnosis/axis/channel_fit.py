@@ -17,24 +17,14 @@ import numpy as np
 from camcomp.diagnosis.axis.channel_data import ACCELERATION, BEYOND, ChannelData
 from camcomp.diagnosis.axis.effect_columns import AxisCause
 from camcomp.diagnosis.axis.findings import lever_mm
-from camcomp.diagnosis.axis.gate import KNOWN, LOCAL
-from camcomp.diagnosis.axis.linear_sets import (
-    CAUSES,
-    PASSES,
-    LinearChannel,
-    LinearFit,
-    jointly,
-    refined_shapes,
-    scanned,
-    settled,
-)
+from camcomp.diagnosis.axis.gate import KNOWN
+from camcomp.diagnosis.axis.linear_sets import LinearFit, by_cause, by_term, jointly, most_probable
 from camcomp.diagnosis.axis.noise_floor import noise_after_fit
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.discrepancy import gains_of_covariates, prior_of_covariate, share_of_covariate
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.imitation import probability_with_unmodelled, products_across
 from camcomp.diagnosis.model.noise import MINOR
-from camcomp.diagnosis.model.search import ROUNDS, sets_of_places
 from camcomp.diagnosis.result.types import Estimate, FoundCause
 from camcomp.ground.datatypes import Floats
 
@@ -77,12 +67,12 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     Healthy sizes of a following error that are larger than on healthy machines are unmodelled, as functions of a covariate are.
     That of the acceleration is weighed against causes beside which it is not; what is left below the floor is none.
     """
-    free = _most_probable(data, terms)
+    free = most_probable(data, terms)
     large = _large(free) if data.channel == "following" else {}
     if ACCELERATION in large:
-        minor = _most_probable(replace(data, minor=frozenset({ACCELERATION})), terms)
+        minor = most_probable(replace(data, minor=frozenset({ACCELERATION})), terms)
         sd = min(free.sd, minor.sd)
-        values = [fit.settled(sd).found.log_evidence for fit in (free, minor)]
+        values = [fit.again(sd).found.log_evidence for fit in (free, minor)]
         if minor.excess <= data.floor**2 or values[0] + prior_of_covariate(free.model) < values[1]:
             free, large = minor, {kind: own for kind, own in _large(minor).items() if kind != ACCELERATION}
     return replace(_answer(free), unmodelled=large)
@@ -92,113 +82,24 @@ def _large(fit: LinearFit) -> dict[str, tuple[float, float]]:
     """Kinds of healthy sizes that are more than minor: share of the channel's energy, and log odds that they are."""
     data = fit.data
     out: dict[str, tuple[float, float]] = {}
-    sizes = fit.residuals()[2]
+    sizes = fit.residuals[1]
     whole = float(np.mean(np.concatenate([data.values[k] for k in data.train]) ** 2))
     for kind in (each for each in BEYOND if each in sizes):
         square = float(np.mean(np.concatenate([data.healthy[k][kind] @ sizes[kind] for k in data.train]) ** 2))
         if square > data.minor_size(kind) ** 2:
-            minor = replace(fit, data=replace(data, minor=data.minor | {kind}))
-            values = [each.settled(fit.sd).found.log_evidence for each in (fit, minor)]
-            gain = values[0] - values[1] + prior_of_covariate(fit.model)
+            minor = fit.again(fit.sd, data.minor | {kind})
+            gain = fit.found.log_evidence - minor.found.log_evidence + prior_of_covariate(fit.model)
             out |= {kind: (min(square / whole, 1.0), gain)} if gain > 0.0 else {}
     return out
 
 
-def _most_probable(data: ChannelData, terms: Sequence[AxisCause]) -> LinearFit:
-    """The most probable set of causes, with shapes and healthy sizes where it stands."""
-    at = [np.zeros(len(t.parameters)) for t in terms]
-    for again in range(PASSES + 1):
-        here = LinearChannel.at(data, terms, at).with_misfit()
-        fit = here.explained(here.noise)
-        same = all(np.allclose(a, b, rtol=1e-3, atol=1e-6) for a, b in zip(at, fit.amounts, strict=True))
-        late = data.clock > 0.0 and again == 0  # rows may be late without any cause, too
-        if again == PASSES or (not late and (same or not fit.members)):
-            break
-        left, _, sizes = fit.residuals()
-        data = fit.data.refined(left, sizes)
-        terms, at = refined_shapes(data, terms, fit.members, fit.amounts, fit.sd)
-    if data.channel == "following" and fit.excess > LOCAL * data.floor**2:
-        fit = _among_every_set(fit)
-    return _without_needless(_without_needless_parameters(fit))
-
-
-def _among_every_set(fit: LinearFit) -> LinearFit:
-    """The most probable of all sets of causes of a loop, each with its own shapes and made linear where it stands.
-
-    Loops of one axis are much alike as long as they are linear, so that steps from one set do not lead to every other. The
-    deviation of a row is that which the best of them leaves.
-    """
-    data, terms, every = fit.data, fit.terms, {}
-    for on in sets_of_places([t.place for t in terms], CAUSES):
-        at = [np.zeros(len(t.parameters)) for t in terms]
-        amount, by = settled(data, terms, at, on=on, sd=data.floor, passes=1).amounts, [*terms]
-        at = [_begun(terms[i], amount[i]) if i in on else each for i, each in enumerate(at)]
-        for _ in range(ROUNDS):
-            by, at = refined_shapes(data.where(by, at), by, on, at, data.floor)
-        every[on] = LinearChannel.at(data, by, at)
-    sd = min(each.noise for each in every.values())
-    return max((each.explained(sd, on) for on, each in every.items()), key=lambda found: found.value)
-
-
-def _begun(term: AxisCause, amount: Floats) -> Floats:
-    """Amplitudes (d,) of a cause from which it is fitted: those of its guess where a tangent has the wrong sign."""
-    wrong = any(p.sign * a < 0.0 for p, a in zip(term.parameters, amount, strict=True))
-    return np.array(term.steps) if wrong and term.steps else amount
-
-
-def _without_needless(fit: LinearFit) -> LinearFit:
-    """The fit without causes that the others, or a function of one covariate, explain as well.
-
-    Sets are made linear where they stand. A cause goes, too, where it is as large as on every healthy machine.
-    """
-    while fit.members:
-        terms, at = fit.acting
-        every = tuple(range(len(terms)))
-        sets = [every, *(tuple(i for i in every if i != out) for out in every)]
-        whole, *less = (settled(fit.data, terms, at, on=on, sd=fit.sd) for on in sets)
-        best = max(less, key=lambda found: found.value)
-        if best.value < whole.value and best.excess - whole.excess > (MINOR * fit.data.floor) ** 2:
-            break
-        fit = best
-    return fit
-
-
-def _without_needless_parameters(fit: LinearFit) -> LinearFit:
-    """The fit with the causes of fewer parameters that are more probable where they stand, as the linear ones did not show."""
-    every, candidates = tuple(range(len(fit.members))), fit.terms
-    while options := _with_fewer_parameters(*fit.acting, candidates):
-        shaped = [refined_shapes(fit.data, terms, every, at, fit.sd) for terms, at in options]
-        fits = [settled(fit.data, *each, on=every, sd=fit.sd) for each in (fit.acting, *shaped)]
-        best = max(fits, key=lambda found: found.found.log_evidence)
-        if best is fits[0]:
-            break
-        fit = best
-    return fit
-
-
-def _with_fewer_parameters(
-    own: Sequence[AxisCause], at: Sequence[Floats], terms: Sequence[AxisCause]
-) -> list[tuple[list[AxisCause], list[Floats]]]:
-    """Causes and amplitudes with one of them replaced by a candidate of its place that lacks parameters of it."""
-    out = {}
-    for i, term in enumerate(own):
-        names = [p.name for p in term.parameters]
-        for other in terms:
-            less = [p.name for p in other.parameters]
-            if other.place == term.place and set(less) < set(names) and set(other.shape) <= set(term.shape):
-                by = replace(other, shape={key: term.shape[key] for key in other.shape})
-                kept = at[i][[names.index(name) for name in less]]
-                out[i, *less] = [*own[:i], by, *own[i + 1 :]], [*at[:i], kept, *at[i + 1 :]]
-    return list(out.values())
-
-
 def _answer(fit: LinearFit) -> ChannelFit:
     data, found, model = fit.data, fit.found, fit.model
-    deviation = fit.by_term(np.sqrt(np.diag(found.amplitudes()[1])))
+    deviation = by_term(fit.acting, np.sqrt(np.diag(found.amplitudes()[1])))
     at = model.posterior(found.background, found.data.slab(found.members))
     every, units = np.concatenate([fit.slots(kind) for kind in fit.unit]), np.concatenate([*fit.unit.values()])
     among = at.covariance(every.tolist()) * np.outer(units, units)
-    left, amount, sizes = fit.residuals()
+    (left, sizes), amount = fit.residuals, fit.amounts
     spreads = _spreads_of_shapes(fit)
     scale = calibration_of("axes")
     causes, acting, imitated, train = [], [], [], [left[k] for k in data.train]
@@ -218,9 +119,9 @@ def _answer(fit: LinearFit) -> ChannelFit:
         causes.append(
             FoundCause(
                 effect=term.effect, target=term.target,
-                probability=scale.calibrate(found.places[term.place]),
+                probability=scale.calibrate(fit.probability[term.place]),
                 share=round(min(max((less - rest) / max(whole, 1e-300), 0.0), 1.0), 4),
-                parameters=_parameters(term, amount[i], half, spreads.get(i, {})),
+                parameters=_parameters(term, amount[i], half, spreads[i]),
             )
         )  # fmt: skip
     drivers, hints = (
@@ -259,8 +160,8 @@ def _design(fit: LinearFit, without: int | None = None) -> Floats:
     """Columns (n, k) of the causes that act, but for one, and of healthy sizes, per standard deviation of their amplitudes before
     the data.
     """
-    slab = fit.found.data.slab(fit.members)
-    on = [j for i in fit.members if i != without for j in fit.model.candidates[i].columns]
+    slab = fit.found.data.slab(fit.found.members)
+    on = [j for i in fit.found.members if i != without for j in fit.model.candidates[i].columns]
     on += [j for kind in fit.unit for j in fit.slots(kind).tolist()]
     return np.asarray(fit.columns(on) * np.array([slab.get(j, 1.0) for j in on]), float)
 
@@ -276,7 +177,7 @@ def _drivers(fit: LinearFit, left: Sequence[Floats]) -> list[dict[str, tuple[flo
     )
     rest = noise_after_fit(B, y, fit.data.floor)
     backgrounds = (replace(fit.found.background, noise=factor) for factor in (1.0, min(rest / fit.sd, 1.0)))
-    return [gains_of_covariates(fit.model, each, fit.members) for each in backgrounds]
+    return [gains_of_covariates(fit.model, each, fit.found.members) for each in backgrounds]
 
 
 def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[str, float]) -> dict[str, Estimate]:
@@ -293,26 +194,23 @@ def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[
             if name not in term.shape:
                 low, value, high = (each[name] for each in ends)
                 out[name] = Estimate.stated(value, low, high)
-    for name in [each for each in term.shape if each in values and each not in term.switches]:
-        value = term.shape[name]
-        if name in term.known:
-            low, high = value - term.known[name], value + term.known[name]
-        else:
-            factor = float(np.exp(1.96 * float(np.hypot(spreads.get(name, 0.0), KNOWN))))
-            low, high = (term.bounded(name, each) for each in (value / factor, value * factor))
-        out[name] = Estimate.stated(value, low, high)
+    for name, around in term.known.items():
+        out[name] = Estimate.stated(term.shape[name], term.shape[name] - around, term.shape[name] + around)
+    for name in [each for each in term.free if each in values]:
+        value, factor = term.shape[name], float(np.exp(1.96 * float(np.hypot(spreads[name], KNOWN))))
+        out[name] = Estimate.stated(value, term.bounded(name, value / factor), term.bounded(name, value * factor))
     return out
 
 
-def _spreads_of_shapes(fit: LinearFit) -> dict[int, dict[str, float]]:
-    """Standard deviations of logarithms of shapes by term; a length is not known better than the positions of rows."""
-    data, members, out = fit.data, fit.members, dict[int, dict[str, float]]()
-    names = scanned(fit.terms, members)
-    if names:
-        _, spread = jointly(data, fit.terms, members, fit.amounts, fit.sd, settings=True)
-        first = sum(len(fit.amounts[i]) for i in members)
-        for (i, name), own in zip(names, spread[first:].tolist(), strict=False):
-            length = any(p.name == name and p.unit in ("mm", "rad") for p in fit.terms[i].module.PARAMETERS)
-            apart = length * data.scatter / (lever_mm(data.hinge) * fit.terms[i].shape[name])
-            out.setdefault(i, {})[name] = float(np.hypot(own, apart))
+def _spreads_of_shapes(fit: LinearFit) -> list[dict[str, float]]:
+    """Standard deviations of logarithms of free shapes by term; a length is not known better than the positions of rows."""
+    data, out = fit.data, []
+    parts = by_cause(fit.acting, jointly(data, fit.acting, fit.sd)[1])
+    for term, own, spread in zip(fit.terms, fit.amounts, parts, strict=True):
+        lengths = {p.name for p in term.module.PARAMETERS if p.unit in ("mm", "rad")}
+        apart = {
+            name: data.scatter / (lever_mm(data.hinge) * term.shape[name]) for name in lengths.intersection(term.free)
+        }
+        each = dict(zip(term.free, spread[len(own) :].tolist(), strict=True))
+        out.append({name: float(np.hypot(value, apart.get(name, 0.0))) for name, value in each.items()})
     return out

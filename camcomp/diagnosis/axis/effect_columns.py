@@ -59,28 +59,15 @@ class AxisCause:
     steps: tuple[float, ...] = ()
 
     @property
-    def scanned(self) -> tuple[str, ...]:
-        """Names of its shape that may have any value."""
-        return tuple(name for name in self.shape if name not in self.switches and self.run is None)
+    def free(self) -> list[str]:
+        """Names of its shape that may have any value above 0."""
+        switches = {p.name for p in getattr(self.module, "FITTED", ()) if p.either}
+        return [name for name, value in self.shape.items() if name not in switches and self.run is None and value > 0.0]
 
     def bounded(self, name: str, value: float) -> float:
         """A value of its shape between the bounds of its parameter."""
         own = next(p for p in self.module.PARAMETERS if p.name == name)
         return float(min(max(value, own.low), own.high))
-
-    @property
-    def switches(self) -> set[str]:
-        """Names of its shape that are one of a few values."""
-        return {p.name for p in getattr(self.module, "FITTED", ()) if p.either}
-
-    @property
-    def other_settings(self) -> list[AxisCause]:
-        """The same cause with another setting of a switch."""
-        fitted = {p.name: p.either for p in getattr(self.module, "FITTED", ()) if p.name in self.shape}
-        return [
-            replace(self, shape={**self.shape, name: value})
-            for name, values in fitted.items() for value in values if value != self.shape[name]
-        ]  # fmt: skip
 
     @property
     def place(self) -> tuple[str, str]:

@@ -61,7 +61,8 @@ class LinearModel:
 
     fitted: indices of the groups that are fitted, None for all; the others are judged only. families: effect -> its columns
     at all targets. healthy: covariates that are always there, with the scale that healthy machines and instruments have,
-    in floors. floors: noise of the groups in floors, more than 1 where their rows count for less.
+    in floors. floors: noise of the groups in floors, more than 1 where their rows count for less. places: at which causes may
+    act, None: those of the candidates.
     """
 
     groups: tuple[Group, ...]
@@ -71,6 +72,7 @@ class LinearModel:
     families: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     healthy: Mapping[str, float] = field(default_factory=dict)
     floors: float = 1.0
+    places: int | None = None
 
     def __post_init__(self) -> None:
         self.layout = ColumnLayout.of(self.groups)
@@ -215,7 +217,7 @@ class LinearModel:
 
     def _log_prior(self, members: Members) -> float:
         """Log prior of a set: its number of causes, places equally likely, shapes of a place equally likely."""
-        places = len({c.place for c in self.candidates})
+        places = len({c.place for c in self.candidates}) if self.places is None else self.places
         return log(SIZES[len(members)] / comb(places, len(members))) - sum(
             log(self.candidates[i].ways) for i in members
         )

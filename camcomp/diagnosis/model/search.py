@@ -14,7 +14,7 @@ from camcomp.ground.datatypes import Floats
 
 MOST = 5  # causes of a set
 ROUNDS = 6  # of searches about what was found, at most
-KEPT = 12  # sets of each size that are enlarged
+KEPT = 12  # sets of each size that are enlarged; of an axis, that are fitted one by one
 SLACK = 6.0  # log posterior by which a set may lie behind the best one, and be enlarged or fitted
 
 
