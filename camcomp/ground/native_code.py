@@ -18,6 +18,7 @@ import numpy as np
 
 INNER: dict[Callable[..., Any], tuple[bool, bool]] = {}  # functions that only compiled ones call: fastmath, allocates
 Run = Any  # (None, arguments, None) -> result
+_ENVIRONMENTS: list[Any] = []  # of all linked code, which points at them as long as the engine lives
 _KINDS = {np.dtype(each).str for each in ("f8", "f4", "i8", "u8", "i4", "i1", "u1", "?")}
 _SCALARS = {bool: "|b1", int: "<i8", float: "<f8"}
 
@@ -77,7 +78,7 @@ def load(name: str, given: ObjectCode) -> Run:
         raise ValueError(f"no {name} in its object file")
     ctypes.c_void_p.from_address(place).value = id(environment)
     run: Any = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)(at)
-    run.environment = environment  # its memory is used
+    _ENVIRONMENTS.append(environment)
     return run
 
 

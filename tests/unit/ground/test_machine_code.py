@@ -1,6 +1,8 @@
 """Compiled code on disk: whatever is found there, the function computes what it says."""
 
+import ctypes
 import errno
+import gc
 import hashlib
 import importlib
 import os
@@ -270,6 +272,19 @@ def test_a_numba_whose_results_cannot_be_kept_compiles_every_time(folder, monkey
         assert fresh() == (42, 0)
         monkeypatch.setattr(native_code, "_link", lambda: importlib.import_module("numba._no_such_module"))
     assert fresh() == (42, 0) == fresh()
+
+
+def test_code_linked_twice_outlives_either(folder):
+    assert fresh() == (42, 0)
+    first, second = (machine_code.Cached(twice).load(native_code.describe((21,)), (21,)) for _ in range(2))
+    (data,) = (each.read_bytes() for each in files(folder))
+    code = native_code.ObjectCode(*pickle.loads(data[hashlib.sha256().digest_size :])[1])
+    del second
+    gc.collect()
+    place = native_code._engine().get_global_value_address(code.environment)
+    pointed = ctypes.c_void_p.from_address(place).value
+    assert pointed in map(id, native_code._ENVIRONMENTS)
+    assert first(None, (21,), None) == 42
 
 
 def test_code_from_the_disk_needs_no_numba(folder):
