@@ -30,6 +30,7 @@ from camcomp.model.motion.travel import (
     motion_of,
     set_point_rates,
     set_points,
+    tips_per_set_point,
     without_inverted_loops,
 )
 from camcomp.model.statics.lengths import LENGTH_STEP_MM, lengthened
@@ -359,7 +360,7 @@ def _tip_way(job: Job, tip: Floats, by: Floats, travel: Travel) -> Floats:
     slopes = set_point_rates(job, tip, travel)
     if by.shape[1] > WORDS:
         slopes = np.where((by != 0.0)[:, :, None], slopes, GOES_ALONG * slopes)
-    way = np.einsum("nkm,nm->nk", np.linalg.pinv(slopes), by)
+    way = np.einsum("nkm,nm->nk", tips_per_set_point(slopes), by)
     out: Floats = way @ job.frame.rotation
     return out
 

@@ -71,6 +71,12 @@ def set_point_rates(job: Job, tip: Floats, travel: Travel) -> Floats:
     return np.stack(rates, axis=2)
 
 
+def tips_per_set_point(rates: Floats) -> Floats:
+    """Pseudo-inverses (n, 3, m) of derivatives (n, m, 3) of set-points by the tip."""
+    inverse_of = np.linalg.inv if rates.shape[1] == WORDS else np.linalg.pinv
+    return np.asarray(inverse_of(rates), np.float64)
+
+
 def motion_of(job: Job, setpoint: Floats, travel: Travel) -> Motion:
     """Motion for the hooks, with the encoders behind the servos."""
     stiffness = signal_path.springs(job.real_machine.robot)
@@ -117,7 +123,7 @@ def ahead_of_loops(job: Job, loops: Sequence[Cause], tips: Floats, travel: Trave
     travel, out = travel.take(rows), tips.copy()
     told = job.frame.to_machine(tips[rows])
     rho = set_points(job, told, travel.force, travel.rotation)
-    ways = np.linalg.pinv(set_point_rates(job, told, travel))
+    ways = tips_per_set_point(set_point_rates(job, told, travel))
     wanted = lead(job, loops, rho, travel)
     for _ in range(MAX_STEPS):
         step = np.einsum("nkm,nm->nk", ways, wanted - rho)
