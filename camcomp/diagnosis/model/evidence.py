@@ -1,7 +1,7 @@
 """Log evidence of sets of causes, in closed form from normal equations (spike and slab).
 
-A column of a cause has a slab of one of several WIDTHS, measured in noise floors of its effect on the channels; every
-other column has the spike: the small errors of a healthy machine (ridge). Nuisances are free. Amplitudes, nuisances and
+A column of a cause has a slab of one of several WIDTHS, measured in noise floors of its effect on the channels, up to what
+these are off; every other column has the spike: the small errors of a healthy machine (ridge). Nuisances are free. Amplitudes, nuisances and
 the dictionary are integrated out.
 
 Source: George, McCulloch, Statistica Sinica 7 (1997) 339; half-normal slabs where an amplitude has a sign.
@@ -34,6 +34,12 @@ LONG = 20  # columns: a longer candidate has no small errors
 FREE = 1e-6  # precision of nuisances in units of their columns
 LEAST_VISIBLE = 1e-6  # of a column's size: what nuisances leave of it; below, the column is not seen
 Members = tuple[int, ...]
+
+
+def widths_up_to(off: float) -> tuple[float, ...]:
+    """WIDTHS, and further ones, two in a decade, up to what channels are off, in floors."""
+    more = max(0, int(np.ceil(2.0 * np.log10(max(off, 1.0) / WIDTHS[-1]))))
+    return WIDTHS + tuple(float(WIDTHS[-1] * 10.0 ** (0.5 * k)) for k in range(1, more + 1))
 
 
 @dataclass(frozen=True)
@@ -114,6 +120,16 @@ class LinearModel:
         seen = free > LEAST_VISIBLE * np.maximum(whole, LEAST_VISIBLE * self.rows)
         return np.where(seen, self.floors * np.sqrt(np.where(seen, free, 1.0) / self.rows * self.channels), 0.0)
 
+    @cached_property
+    def widths(self) -> tuple[float, ...]:
+        """Widths of slabs in floors, up to what the channels are off beside nuisances."""
+        free = np.full(self.layout.size, np.inf)
+        for own in self.layout.nuisances.values():
+            free[own] = FREE
+        left = AmplitudePosterior.of(self.total(None), free)
+        square = max(left.data.c - float(left.target @ left.target), 0.0)
+        return widths_up_to(self.floors * float(np.sqrt(square / self.rows * self.channels)))
+
     @property
     def rows(self) -> int:
         """Number of values."""
@@ -146,7 +162,7 @@ class LinearModel:
         size, bounds = self.size[columns], self.bounds
         if not (size > 0.0).all():
             return np.zeros(len(columns))
-        most = np.maximum(np.abs(bounds.low[columns]), np.abs(bounds.high[columns])) / WIDTHS[-1]
+        most = np.maximum(np.abs(bounds.low[columns]), np.abs(bounds.high[columns])) / self.widths[-1]
         return np.asarray(np.minimum(1.0 / (size * np.sqrt(max(len(columns), 1))), most), float)
 
     def precision(self, background: Background, slab: Mapping[int, float] | None = None) -> Floats:
@@ -206,7 +222,7 @@ class LinearModel:
             gram[np.ix_(effects, effects)], moment[effects] = own, by
             self._reduced[background] = Reduced(
                 candidates=self.candidates, units=self._units, bounds=self.bounds, prior=self._log_prior, gram=gram,
-                moment=moment, none=at.log_evidence,
+                moment=moment, none=at.log_evidence, widths=self.widths,
             )  # fmt: skip
         return self._reduced[background]
 

@@ -81,6 +81,11 @@ def test_a_process_is_a_covariance_of_rows():
     assert m.reduced(Background(process=process)).none == pytest.approx(expected, abs=1e-3)
 
 
+def test_a_cause_is_as_large_as_the_rows_say_however_small_the_floor_is():
+    m = replace(model(np.random.default_rng(1), (5.0,), sd=1.0), floors=2000.0)  # rows of a deviation of 2000 floors
+    assert m.reduced(Background()).estimate((0,))[0] == pytest.approx([5.0], rel=0.05)
+
+
 def test_causes_are_found_with_intervals_that_hold():
     hits = 0
     for seed in range(20):
