@@ -45,7 +45,8 @@ class AxisCause:
     """A candidate of one axis: parameters (d,) that are fitted, in units of their scales, and its shape.
 
     ways: number of shapes that were tried for its place. run: the one in which it acts, None for all.
-    known: to what values of its shape are known. steps (d,): amplitudes at which an absent cause is made linear, in scales.
+    known: to what values of its shape are known. least: below what they are nothing of its own. steps (d,): amplitudes at which an
+    absent cause is made linear, in scales.
     """
 
     effect: str
@@ -56,6 +57,7 @@ class AxisCause:
     ways: float = 1.0
     run: str | None = None
     known: Mapping[str, float] = field(default_factory=dict)
+    least: Mapping[str, float] = field(default_factory=dict)
     steps: tuple[float, ...] = ()
 
     @property
@@ -67,7 +69,7 @@ class AxisCause:
     def bounded(self, name: str, value: float) -> float:
         """A value of its shape between the bounds of its parameter."""
         own = next(p for p in self.module.PARAMETERS if p.name == name)
-        return float(min(max(value, own.low), own.high))
+        return float(min(max(value, own.low, self.least.get(name, own.low)), own.high))
 
     @property
     def place(self) -> tuple[str, str]:
@@ -228,10 +230,12 @@ def candidates(
     without: Sequence[str],
     *,
     ahead: bool = False,
+    turned: float = 0.0,
 ) -> list[AxisCause]:
     """Effects of the library, and of users, that may act on a channel of an axis, once for each shape.
 
-    ahead: whether encoders are ahead of their set-points.
+    ahead: whether encoders are ahead of their set-points. turned: speed, mm/s or rad/s, up to which friction turns round in any
+    form, so that Stribeck friction is not told from it.
     """
     actuator = axes[0].actuator
     found: list[AxisCause] = []
@@ -248,14 +252,14 @@ def candidates(
         shapes = _shapes(module, own, axes, channel)
         fits = [(shape, linear) for shape in shapes if linear]
         if channel == "force" and name == "friction":
-            fits = _with_more_friction(fits, actuator.revolute)
+            fits = _with_more_friction(fits, actuator.revolute, turned)
         for shape, fitted in fits:
             names = {p.name for p in fitted}
             found.append(
                 AxisCause(
                     effect=name, module=module, target=actuator.name, parameters=fitted,
                     shape={key: value for key, value in shape.items() if key not in names},
-                    ways=float(len(fits) * getattr(module, "GUESSED_FROM", 1)),
+                    ways=float(len(fits) * getattr(module, "GUESSED_FROM", 1)), least={STRIBECK[actuator.revolute][1]: turned},
                     steps=tuple(shape[p.name] / p.scale if p.name in shape else 1.0 for p in fitted),
                 )
             )  # fmt: skip
@@ -263,14 +267,16 @@ def candidates(
 
 
 def _with_more_friction(
-    fits: Sequence[tuple[dict[str, float], tuple[Parameter, ...]]], hinge: bool
+    fits: Sequence[tuple[dict[str, float], tuple[Parameter, ...]]], hinge: bool, turned: float
 ) -> list[tuple[dict[str, float], tuple[Parameter, ...]]]:
     """Shapes and parameters of Coulomb friction by itself, with friction of the speed, and with Stribeck's in addition."""
     known = {p.name: p for p in shelf.load("effects", "friction").PARAMETERS}
     viscous, asymmetry = (known[name] for name in DRAG[hinge])
     more, slow = (known[name] for name in STRIBECK[hinge])
     out = [(shape, (*own, *drag)) for shape, own in fits for drag in ((), (viscous,), (viscous, asymmetry))]
-    return out + [(shape | {slow.name: v}, (*own, viscous, more)) for shape, own in fits for v in slow.scan]
+    return out + [
+        (shape | {slow.name: v}, (*own, viscous, more)) for shape, own in fits for v in slow.scan if v > turned
+    ]
 
 
 def _acts(name: str, module: Any, axis: DrivenAxis, channel: ChannelName) -> bool:

@@ -56,13 +56,13 @@ def study_channel(found: AxisFindings, rows: ChannelData, around: AxisSurroundin
     seen, axes = rows.seen, [around.driven(found.name, run) for run in rows.runs]
     if force:
         axes = [replace(a, way=_way(a.run, m, on)) for a, m, on in zip(axes, rows.moves, seen, strict=True)]
-    terms = candidates(around.robot, [axes[k] for k in rows.train], rows.channel, sorted(without), ahead=rows.ahead)
+    healthy, inertia, turned = _healthy(found, rows, around, axes)
+    fitted = [axes[k] for k in rows.train]
+    terms = candidates(around.robot, fitted, rows.channel, sorted(without), ahead=rows.ahead, turned=turned)
 
     def response(k: int, acting: Sequence[tuple[AxisCause, Floats]]) -> Floats:
         causes = [term.cause(own.tolist()) for term, own in acting if term.run in (None, rows.runs[k].name)]
         return axes[k].channel(rows.channel, causes)[seen[k]] if causes else np.zeros(len(rows.values[k]))
-
-    healthy, inertia = _healthy(found, rows, around, axes)
 
     def deflected(k: int, acting: Sequence[tuple[AxisCause, Floats]]) -> dict[str, Floats]:
         if not following:
@@ -205,8 +205,10 @@ def _way(run: AxisRun, moved: AxisTravel, seen: np.ndarray) -> Floats:
 
 def _healthy(
     found: AxisFindings, rows: ChannelData, around: AxisSurroundings, axes: Sequence[DrivenAxis]
-) -> tuple[list[dict[str, Floats]], list[dict[str, Floats]]]:
-    """Columns of the sizes that every axis has, by kind, of every run, and those that are force of inertia alone."""
+) -> tuple[list[dict[str, Floats]], list[dict[str, Floats]], float]:
+    """Columns of the sizes that every axis has, by kind, of every run, those that are force of inertia alone, and the speed, rad/s, up
+    to which the friction of a hinge turns round by its torque, 0 elsewhere.
+    """
     seen, hinge, force = rows.seen, rows.hinge, rows.channel == "force"
     forces = [run.force[on] for run, on in zip(rows.runs, seen, strict=True)]
     loads = [np.stack([a.weight[on], a.inertia[on]], axis=1) for a, on in zip(axes, seen, strict=True)]
@@ -215,7 +217,7 @@ def _healthy(
         around.bodies(found.name, *each, found.wide) for each in zip(rows.runs, rows.moves, strict=True) if behind
     ]
     base = base_of([bodies[k][0] for k in rows.train if behind] or [np.zeros((1, 0))])
-    turns = _turns_at(rows, [bodies[k][0] @ base for k in rows.train]) if behind else None
+    turns = _turns_at(rows, [bodies[k][0] @ base for k in rows.train]) if behind else 0.0
     out, inertia = [], []
     for k, m in enumerate(rows.moves):
         angle = m.position / lever_mm(True)
@@ -247,7 +249,7 @@ def _healthy(
                 own["stated masses"], moved["stated masses"] = loads[k], loads[k] * [0.0, 1.0]
         out.append(own)
         inertia.append(moved)
-    return out, inertia
+    return out, inertia, CORNERS[-1] * turns / lever_mm(hinge)
 
 
 def _turns_at(rows: ChannelData, bodies: Sequence[Floats]) -> float:
@@ -267,13 +269,13 @@ def _turns_at(rows: ChannelData, bodies: Sequence[Floats]) -> float:
     return float(scales[np.argmax(gain)])
 
 
-def _turning(m: AxisTravel, turns: float | None) -> Floats:
+def _turning(m: AxisTravel, turns: float) -> Floats:
     """Friction that turns round with the speed, minus the one that does over a distance, (n, q).
 
-    turns: speed about which it does by any polygon, in a hinge; None in a slide, where it may do at several speeds.
+    turns: speed about which it does by any polygon, in a hinge; 0 in a slide, where it may do at several speeds.
     """
     speed = m.speed[:, None]
-    if turns is None:
+    if turns == 0.0:
         turned = np.tanh(speed / TURNS_MM_PER_S)
     else:
         turned = np.clip(speed / (turns * np.array(CORNERS)), -1.0, 1.0)
