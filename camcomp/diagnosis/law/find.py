@@ -107,7 +107,7 @@ class _Search:
                 break
         if not chosen:
             return None
-        chosen = self._by_size(chosen)
+        chosen = self._without_idle(chosen)
         # cross-validation by runs cannot test terms that act in one of them alone
         self.folds = self.base(ALTERNATING if any(t.form.passing for t in chosen) else self.split, False)
         return self._answer(self._with_constants(chosen), pool)
@@ -157,7 +157,9 @@ class _Search:
         return _TermSets(found, self.folds.together(found.columns), [self._cost(t) for t in terms])
 
     def _best_set(self, pool: Sequence[Term]) -> tuple[Term, ...]:
-        return tuple(pool[i] for i in simplest(search_sets(self._sets(pool)), pool))
+        """The term first that explains most alone."""
+        sets = search_sets(self._sets(pool))
+        return tuple(pool[i] for i in sorted(simplest(sets, pool), key=lambda i: -sets[(i,)]))
 
     def _with_constants(self, chosen: tuple[Term, ...]) -> tuple[Term, ...]:
         """The terms, and a constant per spot where it makes withheld parts clearly more probable."""
@@ -168,11 +170,11 @@ class _Search:
                 chosen = more
         return chosen
 
-    def _by_size(self, chosen: Sequence[Term]) -> tuple[Term, ...]:
-        """The terms that move the tip by MINOR of the noise floor, or the largest one; the largest first."""
-        size = dict(zip(chosen, strengths(self.bench, fitted(self.shapes, chosen, self.folds)), strict=True))
-        order = sorted(chosen, key=lambda t: -size[t])
-        return (order[0], *(t for t in order[1:] if size[t] > (MINOR * self.floor_mm) ** 2))
+    def _without_idle(self, chosen: Sequence[Term]) -> tuple[Term, ...]:
+        """The terms that move the tip by MINOR of the noise floor, or the largest one."""
+        size = list(strengths(self.bench, fitted(self.shapes, chosen, self.folds)))
+        least = min(max(size), (MINOR * self.floor_mm) ** 2)
+        return tuple(t for t, own in zip(chosen, size, strict=True) if own >= least)
 
     def _answer(self, chosen: Sequence[Term], pool: Sequence[Term]) -> FoundLaw:
         own, others = len(chosen), [each for each in pool if each not in chosen]
