@@ -62,33 +62,6 @@ def _gains(
     return np.concatenate(gains)
 
 
-def settled_interval(
-    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], base: Folds,
-    noise: Noise,
-) -> dict[str, float]:  # fmt: skip
-    """The interval, near the best candidate interval, whose columns explain most after the removal of the other
-    columns.
-
-    An interval that begins at a reversal resembles play: a residual without all plays shows less of it there.
-    """
-    paths = [run.run_path for run in bench.runs]
-    every = _gains(bench, candidate, shapes, base, noise)
-    best, (start, end) = dict(shapes[int(every.argmax())]), [p.name for p in candidate.shapes]
-    run = next((p for p in paths if p.started <= 0.5 * (best[start] + best[end]) <= p.started + p.time[-1]), paths[0])
-    row, step, most = float(np.median(np.diff(run.time))), 4, -np.inf
-    while step:
-        near = [best, *({**best, which: best[which] + sign * step * row} for which in (start, end) for sign in (-1, 1))]
-        near = [each for each in near if each[end] - each[start] > 2 * row]
-        if not near:
-            return best
-        gains = _gains(bench, candidate, near, base, noise)
-        if gains.max() > most and gains.argmax() > 0:
-            most, best = float(gains.max()), near[int(gains.argmax())]
-        else:
-            step //= 2
-    return best
-
-
 def reach(p: Parameter, value: float) -> float:
     """Share of its value by which a shape may move in one step: half way to the next value that was scanned."""
     gaps = np.abs(np.log(np.asarray(p.scan)[np.asarray(p.scan) > 0] / value))

@@ -17,8 +17,8 @@ from camcomp.diagnosis.fit.columns import (
     with_scatter,
 )
 from camcomp.diagnosis.fit.floor import least_noise, measure_floor
-from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns, settled_interval
-from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, log_intervals, never_ending
+from camcomp.diagnosis.fit.grid_parameters import best_shape, quick_columns
+from camcomp.diagnosis.fit.intervals_in_time import likely_interval, log_intervals, never_ending
 from camcomp.diagnosis.fit.noise import instrument_noise, with_doubt
 from camcomp.diagnosis.fit.outliers import outlying
 from camcomp.diagnosis.fit.patterns import Dictionary, dictionary
@@ -135,7 +135,11 @@ def _scanned(problem: Problem) -> Problem:
         white=white, residual=problem.white_residual, precision=precision, constants=[], split=Split(1, 1),
         places=[problem.row_places(k) for k in range(len(problem.white))],
     )  # fmt: skip
-    rest = base.left()
+    left = [
+        r - (each @ base.mean).reshape(r.T.shape).T
+        for r, each in zip(problem.residuals, problem.columns.blocks, strict=True)
+    ]
+    left = [_in_noise(problem, k, each[:, :, None])[:, :, 0] for k, each in enumerate(left)]
     changed: list[tuple[list[int], list[list[Floats]]]] = []
     for i in scanned:
         candidate = problem.columns.candidates[i]
@@ -143,11 +147,11 @@ def _scanned(problem: Problem) -> Problem:
             continue
         if problem.passing(i):
             always = quick_columns(problem.bench, candidate, [never_ending(candidate)])
-            white = [problem.noise.by_channel(k, each) for k, each in enumerate(always)]
-            near = likely_intervals(problem.bench, candidate, white, rest, problem.row_places)
-            if not near:
+            motions = [_in_noise(problem, k, each.dense()) for k, each in enumerate(always)]
+            found = likely_interval(problem.bench, candidate, motions, left, problem.times)
+            if found is None:
                 continue
-            best = settled_interval(problem.bench, candidate, near, base, problem.noise)
+            best = found
         else:
             best = best_shape(problem.bench, candidate, base, problem.noise)
         problem.shapes[i] = best
@@ -165,3 +169,8 @@ def _scanned(problem: Problem) -> Problem:
             blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))
             whole[k] = whole[k].exchanged(index, problem.noise.rows(k, new))
     return replace(problem, columns=replace(problem.columns, blocks=tuple(blocks), prior=prior), white=whole)
+
+
+def _in_noise(problem: Problem, k: int, values: Floats) -> Floats:
+    """Values (n, c, p) of run k in units of the noise of their rows, 0 where a row has no value."""
+    return np.asarray(np.nan_to_num(values / (problem.noise.sigma[k] * problem.noise.inflate[k])[:, :, None]))

@@ -92,9 +92,10 @@ class Folds:
         data = [NormalEquations(A, b, 0.0, 0) for A, b in zip(*sums, strict=True)]
         self._each = [AmplitudePosterior.of(own, self.precision) for own in data]
 
-    def left(self) -> list[Floats]:
-        """White residual (w,) per run that the base leaves, fitted to all data."""
-        return [r - W @ self._each[0].mean for r, W in zip(self.residual, self.white, strict=True)]
+    @property
+    def mean(self) -> Floats:
+        """Coordinates (k,) of the base, fitted to all data."""
+        return self._each[0].mean
 
     def means(self, more: Sequence[RunColumns], precision: Floats) -> Floats:
         """Coordinates (f, k) of the base, fitted jointly with law columns of that prior precision: with all data, and

@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.fit.intervals_in_time import likely_intervals
-from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.fit.intervals_in_time import likely_interval
 
 ROWS, STEP_S, BEGAN, OVER = 800, 0.01, 150, 420
 CANDIDATE = SimpleNamespace(
@@ -14,32 +13,30 @@ CANDIDATE = SimpleNamespace(
 )
 
 
-def filtered(values, memory, gain):
-    """Rows minus their prediction from earlier rows."""
-    expected, out = 0.0, []
-    for value in values:
-        out.append(value - expected)
-        expected = memory * (expected + gain * out[-1])
-    return np.array(out)
+def found_in(left):
+    """The interval of a run with rows left (n,) of one channel, in which a constant explains most."""
+    path = SimpleNamespace(started=5.0, ordered=True)
+    bench = SimpleNamespace(runs=[SimpleNamespace(run_path=path)])
+    return likely_interval(bench, CANDIDATE, [np.ones((ROWS, 1, 1))], [left[:, None]], [STEP_S * np.arange(ROWS)])
 
 
-@pytest.mark.parametrize(("memory", "gain"), [(0.0, 0.0), (0.5, 1.0), (0.99, 0.3), (0.999, 0.1)])
-def test_begin_and_end_are_among_what_is_likely_whatever_memory_the_noise_has(memory, gain):
+def noise(seed, memory):
+    """White noise of size 0.7 and a slow part of size 0.7 with memory."""
+    rng = np.random.default_rng(seed)
+    white, drawn = rng.normal(0.0, 0.7, (2, ROWS))
+    for n in range(1, ROWS):
+        drawn[n] = memory * drawn[n - 1] + np.sqrt(1.0 - memory**2) * drawn[n]
+    return white + drawn
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.99, 0.999])
+def test_begin_and_end_are_found_whatever_memory_the_noise_has(memory):
     """Of a shift of forty units, sixty times the noise."""
     at = np.arange(ROWS)
-    shift = np.where((at >= BEGAN) & (at < OVER), 40.0, 0.0) + np.random.default_rng(3).normal(0.0, 0.7, ROWS)
-    always = ByChannel(1, ((np.arange(1), filtered(np.ones(ROWS), memory, gain)[:, None]),))
-    path = SimpleNamespace(started=5.0, time=STEP_S * at)
-    bench = SimpleNamespace(runs=[SimpleNamespace(run_path=path)])
-    rest = filtered(shift, memory, gain)
-    found = likely_intervals(bench, CANDIDATE, [always], [rest], lambda k: np.linspace(0.0, 1.0, ROWS))
-    off = [max(abs(each["from_s"] - 5.0 - STEP_S * BEGAN), abs(each["to_s"] - 5.0 - STEP_S * OVER)) for each in found]
-    assert min(off) < 1.5 * STEP_S
+    found = found_in(np.where((at >= BEGAN) & (at < OVER), 40.0, 0.0) + noise(3, memory))
+    assert found["from_s"] == pytest.approx(5.0 + STEP_S * BEGAN, abs=1.5 * STEP_S)
+    assert found["to_s"] == pytest.approx(5.0 + STEP_S * OVER, abs=1.5 * STEP_S)
 
 
 def test_noise_alone_has_none():
-    path = SimpleNamespace(started=0.0, time=STEP_S * np.arange(ROWS))
-    bench = SimpleNamespace(runs=[SimpleNamespace(run_path=path)])
-    always = ByChannel(1, ((np.arange(1), np.ones((ROWS, 1))),))
-    rest = np.random.default_rng(4).normal(0.0, 1.0, ROWS)
-    assert likely_intervals(bench, CANDIDATE, [always], [rest], lambda k: np.linspace(0.0, 1.0, ROWS)) == []
+    assert found_in(noise(4, 0.0)) is None
