@@ -16,10 +16,9 @@ from camcomp.diagnosis.model.verdict import Word, decide
 from camcomp.diagnosis.search.credible import MODELLED, credibility, with_unmodelled
 from camcomp.diagnosis.search.fitted_sets import FittedSets
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
-from camcomp.diagnosis.search.unknown import foretelling, residual_tests
+from camcomp.diagnosis.search.unknown import Shares, foretelling, residual_tests
 from camcomp.diagnosis.statistics.evidence import misfit
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
-from camcomp.diagnosis.statistics.score_test import Shares
 from camcomp.ground.datatypes import Floats
 
 LEFT_OPEN = 0.25  # of what causes explain together: no set explains what leaves more, however large its members are

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from math import log
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
 from camcomp.diagnosis.fit.cause_sets import Fitted, Scale, parts_of
@@ -31,7 +32,6 @@ from camcomp.diagnosis.search.unknown import joint_products, process_in_time
 from camcomp.diagnosis.statistics.evidence import posterior
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations
 from camcomp.diagnosis.statistics.probability import TEMPERATURE
-from camcomp.diagnosis.statistics.score_test import products_of_effect
 from camcomp.ground.datatypes import Floats, Ints
 
 MODELLED = 0.1  # of what causes explain: none is modelled better than that
@@ -142,7 +142,10 @@ def with_unmodelled(problem: Problem, f: Fitted, excess_um: float) -> dict[int, 
     out, columns = {}, problem.candidates.columns
     for i, theta in _thetas(problem, f).items():
         others, own, size = tuple(j for j in f.members if j != i), columns[i], problem.moved_um(f, (i,))
-        products = products_of_effect(joint, problem.prior, problem.member_columns(others), own, theta)
+        beside = posterior(joint, problem.prior, problem.member_columns(others), own)
+        gram, _ = beside.blocks_without([np.array([*own, *range(k, len(joint.b))])])[0]
+        effect = block_diag(theta[:, None], np.eye(len(joint.b) - k))
+        products = effect.T @ gram @ effect  # of what the cause does, and of functions, with all else within tolerance
         products *= size**2 / float(theta @ joint.A[np.ix_(own, own)] @ theta)  # as mean squares at the tip
         odds = problem.candidates.prior(f.members) - problem.candidates.prior(others)
         out[i] = probability_with_unmodelled(

@@ -11,25 +11,49 @@ from scipy.linalg import eigh
 from camcomp.diagnosis.fit.cause_sets import Fitted
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.classes import INDISTINGUISHABLE
-from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SCALES
+from camcomp.diagnosis.model.discrepancy import LENGTHS, ROWS_OF_PROCESS, SCALES, gains_at_scales
 from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram, posterior
 from camcomp.diagnosis.statistics.normal_equations import NormalEquations, sum_grams
-from camcomp.diagnosis.statistics.score_test import Shares, score_test
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
+Shares = tuple[tuple[str, float], ...]  # covariates with the share that each takes alone, largest first
 SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
 CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
 
 
 def residual_tests(problem: Problem, f: Fitted) -> dict[str, Shares]:
-    """Score test on the residual of a set, per kind of channel."""
-    prior = firm_prior(problem)
-    joint = joint_products(problem, f, [np.ones(len(r)) for r in f.residual])
-    patterns = np.arange(len(prior.tolerance), len(joint.b))
-    P, h = posterior(joint, prior, problem.member_columns(f.members)).blocks_without([patterns])[0]
-    return score_test(P, h, problem.dictionary.labels, problem.dictionary.kinds)
+    """Covariates on which the residual of a set depends, per kind of channel.
+
+    That kind is first of which functions take most. Of every covariate: what its functions take alone, as a share of that.
+    """
+    prior, joint = firm_prior(problem), joint_products(problem, f, [np.ones(len(r)) for r in f.residual])
+    at = posterior(joint, prior, problem.member_columns(f.members))
+    labels, kinds = np.array(problem.dictionary.labels), np.array(problem.dictionary.kinds)
+    found = []
+    for kind in dict.fromkeys(problem.dictionary.kinds):
+        mine = kinds == kind
+        names = dict.fromkeys(labels[mine].tolist())
+        blocks = [np.flatnonzero(mine & (labels == name)) for name in names]
+        every = at.blocks_without([len(prior.tolerance) + own for own in (np.flatnonzero(mine), *blocks)])
+        whole, *each = [energy_taken(*block) for block in every]
+        shares = [
+            (name, min(energy / whole, 1.0))
+            for name, energy in zip(names, each, strict=True)
+            if 0.0 < energy and whole > 0.0
+        ]
+        found.append((whole, kind, tuple(sorted(shares, key=lambda share: -share[1]))))
+    return {kind: shares for _, kind, shares in sorted(found, key=lambda each: -each[0])}
+
+
+def energy_taken(gram: Floats, moment: Floats) -> float:
+    """Energy, in units of the noise, that functions take at their most probable scale; none where nothing is more probable.
+
+    gram (q, q), moment (q,): their normal equations.
+    """
+    gains, amount = gains_at_scales(gram, moment)
+    return max(float(2.0 * moment @ amount - amount @ gram @ amount), 0.0) if gains.max() > 0.0 else 0.0
 
 
 def joint_products(problem: Problem, f: Fitted, weight: Sequence[Floats]) -> NormalEquations:

@@ -3,17 +3,21 @@
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.search.unknown import energy_taken
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Prior, gram, posterior
 from camcomp.diagnosis.statistics.normal_equations import sum_grams
-from camcomp.diagnosis.statistics.score_test import explained
 
 
 def test_a_pattern_given_twice_counts_once():
     def energy(n):
-        return explained(np.full((n, n), 50.0), np.full(n, 40.0), np.arange(n))
+        return energy_taken(np.full((n, n), 50.0), np.full(n, 40.0))
 
-    assert energy(2) == pytest.approx(energy(1)) and energy(1) > 0.0
+    assert energy(2) == pytest.approx(energy(1), rel=1e-3) and energy(1) == pytest.approx(32.0, rel=0.01)
+
+
+def test_functions_of_noise_take_nothing():
+    assert energy_taken(50.0 * np.eye(3), np.sqrt(50.0) * np.array([0.3, -1.0, 0.6])) == 0.0
 
 
 @pytest.mark.parametrize("weight", [[[1.0, 1.0], [1.0, 1.0]], [[0.5, 2.0], [1.0, 0.0]]])
