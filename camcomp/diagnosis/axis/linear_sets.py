@@ -21,8 +21,9 @@ from camcomp.diagnosis.model.discrepancy import covariate_columns, gains_of_more
 from camcomp.diagnosis.model.evidence import Background, LinearModel
 from camcomp.diagnosis.model.explain import Explanation, posterior_of
 from camcomp.diagnosis.model.group import Group
-from camcomp.diagnosis.model.noise import MINOR
+from camcomp.diagnosis.model.noise import MINOR, REPEATABILITY_MM
 from camcomp.diagnosis.model.search import KEPT, ROUNDS, search_sets, sets_of_places
+from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Floats, Ints
 
 STEP = 1e-3  # of an amplitude in scales, for slopes
@@ -57,6 +58,11 @@ class LinearChannel:
         Rows that are correlated count for less: the variance is that of a row times the rows that count as one.
         """
         return noise_after_fit(*self._columns, self.data.floor)
+
+    @property
+    def left(self) -> float:
+        """The same where neighbouring rows say nothing of it."""
+        return noise_after_fit(*self._columns, REPEATABILITY_MM)
 
     @property
     def _columns(self) -> tuple[Floats, Floats]:
@@ -224,16 +230,23 @@ def choose(channels: Sequence[LinearChannel], sd: float, places: int) -> LinearF
     """The most probable of sets, with the smallest deviation of a row that any of them leaves, and sd at most.
 
     Parameters of the same causes are weighed by their evidence alone, causes jointly with a function of one covariate. A part of
-    the best set takes its place where all else does no more than on healthy machines.
+    the best set takes its place where it is half as probable at least, or all else does no more than on healthy machines. The rows of
+    a following error whose floor is not stated scatter by what the best set leaves, where that is less: neighbouring rows say more where
+    the axis does not move evenly between them.
     """
     misfit = min(each.with_misfit().data.misfit for each in channels)
     channels = [replace(each, data=replace(each.data, misfit=misfit)) for each in channels]
-    sd = min(sd, *(each.noise for each in channels))
+    known = channels[0].data.stated or channels[0].data.channel != "following"
+    sd = min(sd, *(each.noise if known else each.left for each in channels))
     every = sorted((each.explained(sd, places) for each in channels), key=lambda fit: fit.found.log_evidence)
     fits = [*{frozenset(fit.places): fit for fit in every if all(own.any() for own in fit.amounts)}.values()]
     p = softmax([fit.value for fit in fits])
     best = fits[int(np.argmax(p))]
-    while parts := [f for f in fits if f.places < best.places and f.excess - best.excess < (MINOR * f.data.floor) ** 2]:
+    while parts := [
+        f for f in fits
+        if f.places < best.places
+        and (f.value > best.value + np.log(EVEN) or f.excess - best.excess < (MINOR * f.data.floor) ** 2)
+    ]:  # fmt: skip
         best = max(parts, key=lambda fit: fit.value)
     own = {place: float(p[[place in fit.places for fit in fits]].sum()) for place in best.places}
     return replace(best, probability=own)
