@@ -27,14 +27,14 @@ class AgainError(Exception):
 
 
 def draw_runs(machine, rng: np.random.Generator) -> list[Run]:
-    """3 to 6 runs on different recordings, one pair of circles among most, a quarter of them in the air."""
+    """3 to 6 runs, or as many as there are, on different recordings, one pair of circles among most, a quarter of them in the air."""
     names = recording.names()
     circles = [n for n in names if n.startswith("circles")]
     count = int(rng.integers(3, 7))
     chosen = [str(rng.choice(circles))] if rng.random() < 0.8 else []
     others = [n for n in names if n not in circles]
-    chosen += [str(n) for n in rng.choice(others, count - len(chosen), replace=False)]
-    chosen = [str(n) for n in rng.permutation(chosen)]
+    chosen += [str(n) for n in rng.choice(others, min(count - len(chosen), len(others)), replace=False)]
+    chosen, count = [str(n) for n in rng.permutation(chosen)], len(chosen)
     air = rng.random(count) < 0.25
     if air.all():
         air[int(rng.integers(count))] = False
