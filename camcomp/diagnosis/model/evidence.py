@@ -1,8 +1,8 @@
 """Log evidence of sets of causes, in closed form from normal equations (spike and slab).
 
 A column of a cause has a slab of one of several WIDTHS, measured in noise floors of its effect on the channels, up to what
-these are off; every other column has the spike: the small errors of a healthy machine (ridge). Nuisances are free. Amplitudes, nuisances and
-the dictionary are integrated out.
+these are off; every other column has the spike: the small errors of a healthy machine (ridge). Nuisances are free.
+Amplitudes, nuisances and the dictionary are integrated out.
 
 Source: George, McCulloch, Statistica Sinica 7 (1997) 339; half-normal slabs where an amplitude has a sign.
 """
@@ -34,12 +34,6 @@ LONG = 20  # columns: a longer candidate has no small errors
 FREE = 1e-6  # precision of nuisances in units of their columns
 LEAST_VISIBLE = 1e-6  # of a column's size: what nuisances leave of it; below, the column is not seen
 Members = tuple[int, ...]
-
-
-def widths_up_to(off: float) -> tuple[float, ...]:
-    """WIDTHS, and further ones, two in a decade, up to what channels are off, in floors."""
-    more = max(0, int(np.ceil(2.0 * np.log10(max(off, 1.0) / WIDTHS[-1]))))
-    return WIDTHS + tuple(float(WIDTHS[-1] * 10.0 ** (0.5 * k)) for k in range(1, more + 1))
 
 
 @dataclass(frozen=True)
@@ -122,13 +116,15 @@ class LinearModel:
 
     @cached_property
     def widths(self) -> tuple[float, ...]:
-        """Widths of slabs in floors, up to what the channels are off beside nuisances."""
+        """Widths of slabs in floors: WIDTHS, and two more a decade up to what the channels are off beside nuisances."""
         free = np.full(self.layout.size, np.inf)
         for own in self.layout.nuisances.values():
             free[own] = FREE
         left = AmplitudePosterior.of(self.total(None), free)
         square = max(left.data.c - float(left.target @ left.target), 0.0)
-        return widths_up_to(self.floors * float(np.sqrt(square / self.rows * self.channels)))
+        off = self.floors * float(np.sqrt(square / self.rows * self.channels))
+        more = np.arange(1.0, np.ceil(2.0 * np.log10(max(off, 1.0) / WIDTHS[-1])) + 1.0)
+        return (*WIDTHS, *(WIDTHS[-1] * 10.0 ** (0.5 * more)).tolist())
 
     @property
     def rows(self) -> int:
