@@ -318,8 +318,9 @@ def _with_pushes(name: str, data: ChannelData, terms: Sequence[AxisCause], done:
 
 def _with_pushes_where_judged(name: str, data: ChannelData, done: ChannelFit) -> ChannelFit:
     """The fit with the disturbance forces of runs that are judged only, from the residual of each."""
+    known = data.refined(done.left, done.sizes)
     for k in data.test:
-        alone = _with_pushes(name, data.residual_of(k, done.left), [], done)
+        alone = _with_pushes(name, known.residual_of(k, done.left), [], done)
         if alone is done:
             continue
         left = [*done.left]
