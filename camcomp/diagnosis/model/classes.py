@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from camcomp.diagnosis.model.evidence import Members
+from camcomp.diagnosis.model.evidence import Members, Reduced
 from camcomp.diagnosis.model.explain import Explanation
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
@@ -32,19 +32,19 @@ def alternatives_of(explanation: Explanation) -> list[Members]:
             continue
         near = p >= top * np.exp(-EQUAL_LOG_ODDS)
         if not near and len(members) <= len(best) and p >= top * np.exp(-2.0 * EQUAL_LOG_ODDS):
-            near = _remaining(data.gram, data.indices(best), amount, data.indices(members)) < INDISTINGUISHABLE
+            near = do_the_same(data, best, amount, members)
         if near:
             out.append(members)
     return out[:MOST_SETS]
 
 
-def _remaining(gram: Floats, on: list[int], amount: Floats, by: list[int]) -> float:
-    """Part of the square of an effect, in floors, that other columns cannot explain."""
-    whole = float(amount @ gram[np.ix_(on, on)] @ amount)
-    if not by:
-        return whole
-    toward = gram[np.ix_(by, on)] @ amount
-    size = 1.0 / np.sqrt(np.maximum(np.diag(gram)[by], 1e-300))
-    own = size[:, None] * gram[np.ix_(by, by)] * size
-    taken = float((size * toward) @ np.linalg.lstsq(own, size * toward, rcond=1e-10)[0])
-    return whole - taken
+def do_the_same(data: Reduced, best: Members, amount: Floats, other: Members) -> bool:
+    """Whether the columns of another set leave less than three deviations of the effect of the best one at amplitudes (d,)."""
+    on, by = data.indices(best), data.indices(other)
+    left = float(amount @ data.gram[np.ix_(on, on)] @ amount)
+    if by:
+        toward = data.gram[np.ix_(by, on)] @ amount
+        size = 1.0 / np.sqrt(np.maximum(np.diag(data.gram)[by], 1e-300))
+        own = size[:, None] * data.gram[np.ix_(by, by)] * size
+        left -= float((size * toward) @ np.linalg.lstsq(own, size * toward, rcond=1e-10)[0])
+    return left < INDISTINGUISHABLE

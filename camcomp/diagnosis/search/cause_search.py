@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.fit.cause_sets import Fitted, probabilities, temperature_of
+from camcomp.diagnosis.fit.cause_sets import Fitted, Scale, probabilities, temperature_of
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
+from camcomp.diagnosis.model.classes import do_the_same
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
 from camcomp.diagnosis.model.evidence import Members
 from camcomp.diagnosis.model.folds import ABOVE
@@ -17,7 +18,6 @@ from camcomp.diagnosis.search.credible import MODELLED, credibility, with_unmode
 from camcomp.diagnosis.search.fitted_sets import FittedSets
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, unexplained, worst
 from camcomp.diagnosis.search.unknown import Shares, foretelling, residual_tests
-from camcomp.diagnosis.statistics.evidence import misfit
 from camcomp.diagnosis.statistics.probability import EQUAL_LOG_ODDS, EVEN
 from camcomp.ground.datatypes import Floats
 
@@ -219,23 +219,11 @@ def _modelled(problem: Problem, f: Fitted) -> float:
 
 
 def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[Members]:
-    """Sets of the size of the best one that fit as well, whatever the priors say of them.
-
-    Priors of sizes, and of how far off the tolerances are all together: the rows and the stated tolerances have to tell.
+    """Sets of the size of the best one that do the same, whatever the priors say of them: the rows and the stated tolerances have
+    to tell.
     """
-    found = []
-
-    def left(f: Fitted) -> float:
-        return misfit(f.data, problem.prior, problem.member_columns(f.members))
-
-    def of_their_signs(f: Fitted) -> bool:
-        parameters = [p for i in f.members for p in problem.columns.candidates[i].parameters]
-        return all(p.sign == 0 or t > 0 for t, p in zip(f.theta, parameters, strict=True))
-
-    for f in fits:
-        if f is best or len(f.members) != len(best.members) or not best.members:
-            continue
-        behind = 0.5 * (left(f) - left(best))
-        if min(behind, best.log_evidence - f.log_evidence) < EQUAL_LOG_ODDS and of_their_signs(f):
-            found.append(f.members)
-    return found
+    if not best.members:
+        return []
+    others = [f.members for f in fits if f is not best and len(f.members) == len(best.members)]
+    data = Scale(best.data, problem.prior, problem.candidates).sets(range(len(problem.candidates.columns)))
+    return [each for each in others if do_the_same(data, best.members, best.theta, each)]

@@ -29,9 +29,7 @@ def problem_of(twin):
         )
         for i in range(2)
     )
-    free = SimpleNamespace(parameters=(SimpleNamespace(sign=0),))
-    columns = SimpleNamespace(candidates=(free, free))
-    return SimpleNamespace(prior=prior, columns=columns, member_columns=list), fits
+    return SimpleNamespace(prior=prior, candidates=candidates), fits
 
 
 def test_an_unusual_size_alone_excludes_no_set():
