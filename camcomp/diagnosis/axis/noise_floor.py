@@ -6,17 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.signal import lfilter
-from scipy.stats import chi2, median_abs_deviation, norm
+from scipy.stats import median_abs_deviation, norm
 
 from camcomp.diagnosis.model.discrepancy import gains_at_scales
-from camcomp.diagnosis.model.noise import AT_FLOOR, FAR_OFF, IN_A_ROW, LEAST_VALUES, REPEATABILITY_MM
+from camcomp.diagnosis.model.noise import FAR_OFF, IN_A_ROW, REPEATABILITY_MM
 from camcomp.ground.datatypes import Floats
 
 STAYING = 0.1  # of the rows that do not move, from which on steps are a resolution
 FAST_S = 0.005  # between rows: within two of them no drive goes out and comes back, however little
 LEAST_SPIKE_MM = 0.1  # the same between rows that are further apart: none goes so far
 QUIET = 0.1  # of the rows, which even busy moves leave without a corner
-STEADY = 0.1  # of a speed, by which it changes at most over the rows of a fourth difference
 
 
 def rows_floor(channels: Sequence[Floats]) -> float:
@@ -69,29 +68,6 @@ def following_floor(pairs: Sequence[tuple[Floats, Floats]]) -> float:
     apart = np.hypot(rows_floor(moved), rows_floor(asked))
     own = rows_floor([x - y for x, y in pairs])
     return float(np.hypot(max(own, float(apart)), REPEATABILITY_MM))
-
-
-def instants_apart(values: Sequence[Floats], speeds: Sequence[Floats], floor: float) -> float:
-    """Standard deviation (s) of the time between the two readings of a row, whose difference is a value (n,) of a run.
-
-    While an axis moves steadily at a speed (n,), values scatter by it times the speed. 0 where the faster half of such rows
-    scatters no more than the floor.
-    """
-    squares, fast = [], []
-    for y, v in zip(values, speeds, strict=True):
-        if len(y) > 4:
-            near = np.lib.stride_tricks.sliding_window_view(v, 5)
-            steady = np.ptp(near, axis=1) < STEADY * np.abs(near.mean(axis=1))
-            squares.append(np.diff(y, 4)[steady] ** 2 / 70.0)
-            fast.append(near.mean(axis=1)[steady] ** 2)
-    square, speed = (np.concatenate([np.zeros(0), *each]) for each in (squares, fast))
-    if len(square) < 2 * LEAST_VALUES:
-        return 0.0
-    upper = speed >= np.median(speed)
-    noise = float(np.median(square[upper]) / chi2.median(1))
-    # two deviations of a median of squares, where three windows count as one
-    sure = AT_FLOOR + 8.0 / np.sqrt(np.count_nonzero(upper))
-    return float(np.sqrt((noise - floor**2) / np.median(speed[upper]))) if noise > sure * floor**2 else 0.0
 
 
 def _of_steady_acceleration(x: float) -> float:

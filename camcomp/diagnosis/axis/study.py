@@ -25,13 +25,12 @@ from camcomp.diagnosis.axis.noise_floor import (
     between_rows,
     by_acceleration_between_rows,
     following_floor,
-    instants_apart,
     rows_floor,
 )
 from camcomp.diagnosis.axis.surroundings import AxisSurroundings
 from camcomp.diagnosis.axis.terms import WIDE, travel
 from camcomp.diagnosis.model.discrepancy import with_discrepancy
-from camcomp.diagnosis.model.noise import REPEATABILITY_MM, StatedDeviation
+from camcomp.diagnosis.model.noise import REPEATABILITY_MM, StatedDeviation, instants_apart
 from camcomp.diagnosis.model.verdict import Word, decide
 from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.standards import StandardValues

@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from camcomp.diagnosis.fit.bench import Bench, Run, per_force, thinned
-from camcomp.diagnosis.fit.floor import NoiseFloor, row_scatter
+from camcomp.diagnosis.fit.floor import NoiseFloor, row_scatter, steady_scatter
 from camcomp.diagnosis.fit.outliers import tails
 from camcomp.diagnosis.fit.starts import unknown_starts
-from camcomp.diagnosis.model.noise import MINOR, rounding_noise
-from camcomp.diagnosis.statistics.noise_model import Noise, weighted_median
+from camcomp.diagnosis.model.noise import instants_apart, rounding_noise
+from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
 
 TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
@@ -122,36 +121,16 @@ def _doubt(bench: Bench, k: int) -> Floats:
 
 
 def jitter(bench: Bench) -> float:
-    """Standard deviation, s, of the instants at which the tip was really read, from noise that grows with the speed.
-
-    Fourth differences leave noise alone; its size where an axis is fast is held against that where it is slow, by medians.
-    0 unless it is plain to see.
+    """Standard deviation, s, of the instants at which the tip was really read, from noise that grows with the speed; at most
+    UNSTEADY_S.
     """
-    found = []
+    gaps, speeds, noise = list[Floats](), list[Floats](), list[float]()
     for k, run in enumerate(bench.runs):
-        t = run.run_path.time
-        if not run.run_path.ordered or len(t) < 60:
-            continue
-        speed = np.abs(_speed(bench, k))
-        gap = bench.off(k)[:, :3]
-        rough = np.diff(gap, 4, axis=0) ** 2 / 70.0
-        for rows, v in zip(rough.T, speed[2:-2].T, strict=True):
-            present = np.isfinite(rows)
-            if present.sum() < 60:
-                continue
-            slow, fast = np.quantile(v[present], (1.0 / 3.0, 2.0 / 3.0))
-            low, high = present & (v <= slow), present & (v >= fast)
-            more = float(np.median(v[high] ** 2) - np.median(v[low] ** 2))
-            rest, push = float(np.median(rows[low])), float(np.median(rows[high]))
-            if fast > 2.0 * slow and more > 0.0 and 0.0 < rest < (UNSTEADY_S * fast) ** 2:
-                found.append(((push - rest) / chi2.median(1) / more, more / rest))
-    if not found:
-        return 0.0
-    gain, reach = np.array(found).T
-    variance = min(
-        weighted_median(gain, reach**2), UNSTEADY_S**2
-    )  # the axes that would see it best have the most to say
-    return float(np.sqrt(variance)) if variance * chi2.median(1) * float(reach.max()) > MINOR else 0.0
+        if run.run_path.ordered:
+            gap, time = bench.off(k)[:, :3].T, run.run_path.time
+            gaps, speeds = [*gaps, *gap], [*speeds, *_speed(bench, k).T]
+            noise += [each for x in gap if np.isfinite(each := steady_scatter(x, time))]
+    return min(instants_apart(gaps, speeds, float(np.median(noise or [np.inf]))), UNSTEADY_S)
 
 
 def _speed(bench: Bench, k: int) -> Floats:

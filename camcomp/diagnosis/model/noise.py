@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from camcomp.ground.datatypes import Floats
 
@@ -18,6 +20,7 @@ LEAST_VALUES = 12  # of a deviation or a resolution: that of n values is known t
 FAR_OFF = 12.0  # robust deviations from its neighbours, or from a model, by which a value is no reading of the machine
 IN_A_ROW = 3  # values so far off, one after the other: no mistakes, something lasts
 MANY = 0.03  # of the values: more that are so far off are no mistakes
+STEADY = 0.1  # of a speed, by which it changes at most over the rows of a fourth difference
 
 
 def resolution_of(values: Floats) -> float:
@@ -35,6 +38,29 @@ def resolution_of(values: Floats) -> float:
 def rounding_noise(step: float) -> float:
     """Standard deviation of rounding to a step: step / sqrt(12)."""
     return step / float(np.sqrt(12.0))
+
+
+def instants_apart(values: Sequence[Floats], speeds: Sequence[Floats], floor: float) -> float:
+    """Standard deviation (s) of the time between the two readings of a row, whose difference is a value (n,) of a run.
+
+    While something moves steadily at a speed (n,), values scatter by it times the speed. 0 where the faster half of such rows
+    scatters no more than the floor.
+    """
+    squares, fast = [], []
+    for y, v in zip(values, speeds, strict=True):
+        if len(y) > 4:
+            near, fourth = np.lib.stride_tricks.sliding_window_view(v, 5).T, np.diff(y, 4)
+            steady = np.isfinite(fourth) & (np.ptp(near, axis=0) < STEADY * np.abs(near.mean(axis=0)))
+            squares.append(fourth[steady] ** 2 / 70.0)
+            fast.append(near.mean(axis=0)[steady] ** 2)
+    square, speed = (np.concatenate([np.zeros(0), *each]) for each in (squares, fast))
+    if len(square) < 2 * LEAST_VALUES:
+        return 0.0
+    upper = speed >= np.median(speed)
+    noise = float(np.median(square[upper]) / chi2.median(1))
+    # two deviations of a median of squares, where three windows count as one
+    sure = AT_FLOOR + 8.0 / np.sqrt(np.count_nonzero(upper))
+    return float(np.sqrt((noise - floor**2) / np.median(speed[upper]))) if noise > sure * floor**2 else 0.0
 
 
 @dataclass(frozen=True)
