@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.compensation.long.field import Field, Tiles
+from camcomp.compensation.long.field import Field, TileFiles, Tiles
 from camcomp.compensation.long.kernel import BASIC, follow, same_points
-from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.compensation.program.compensate import Compensated, compensate
 from camcomp.compensation.program.result import BOUND_UM, Interpolation
 from camcomp.gcode.program import Program

@@ -6,11 +6,16 @@ solutions, not used in the fit, measure its error. A cube with too large an erro
 not help (near singular configurations, at the border of the workspace) its points are solved exactly, one by one.
 
 The cubes depend on the machine, the range of forces and the origin of the programs: files keep them for later programs.
+The name and the content of a file say which cubes it holds; those of other sources of the solver are not used. A file is a
+copy of what is computed without it, so that outputs do not depend on whether it is there.
 """
 
 from __future__ import annotations
 
+import hashlib
+from contextlib import suppress
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,8 +32,9 @@ from camcomp.compensation.long.kernel import (
     look_up,
     put_cells,
 )
-from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.errors import FileError
+from camcomp.ground.machine_code import CodeFiles, digest, find_folder
 from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import shifted
 from camcomp.model.statics.machine import Machine
@@ -51,6 +57,7 @@ NARROW = 6.0  # a force component so many times smaller than the largest needs a
 WIDER = 1.25  # limits of the force range are powers of it, so that programs with about the same forces share cubes
 NO_FORCE_N = 1e-9
 SLICE = 1 << 14  # rows that a thread takes at once
+MOST_FILES = 16
 _ZERO = np.zeros(3)
 
 
@@ -159,6 +166,36 @@ def _outward(limit: Floats) -> Floats:
     """Limits (3,) of at least zero, up to the next powers of WIDER; forces below NO_FORCE_N are zero."""
     force = limit > NO_FORCE_N
     return np.where(force, WIDER ** np.ceil(np.log(np.where(force, limit, 1.0)) / np.log(WIDER) - 1e-9), 0.0)
+
+
+class TileFiles:
+    """The cubes of one machine on disk, in a folder that only the user can change; a damaged file counts as missing."""
+
+    def __init__(self, machine: Machine) -> None:
+        own = Path(__file__)
+        numbers = hashlib.sha256()
+        parts = (*machine.elastic, *machine.rigid, machine.joint_var, machine.start_pose, machine.start_y)
+        tools = (machine.robot.tool, machine.nominal.tool, machine.nominal.held_rotation)
+        for each in (*parts, *tools, machine.revolute):
+            numbers.update(np.ascontiguousarray(each).tobytes())
+        self._machine, self._files = numbers.hexdigest(), None
+        with suppress(OSError):
+            folder, stamp = find_folder(own), digest(own)
+            self._files = None if folder is None else CodeFiles(folder, "tiles", stamp)
+
+    def load(self, key: tuple[Any, ...]) -> dict[str, Any] | None:
+        """Tiles that were kept; None: there are none."""
+        with suppress(Exception):  # a damaged file counts as none
+            return self._files.load((self._machine, key)) if self._files is not None else None
+        return None
+
+    def save(self, key: tuple[Any, ...], tiles: dict[str, Any] | None) -> None:
+        """Keep tiles, and the newest MOST_FILES files. None: forget those of the key."""
+        if self._files is None:
+            return
+        with suppress(OSError, FileError):
+            self._files.save((self._machine, key), tiles)
+            self._files.leave(MOST_FILES)
 
 
 class Field:

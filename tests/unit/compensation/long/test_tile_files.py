@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from camcomp.compensation.long import tile_files
-from camcomp.compensation.long.field import Field
-from camcomp.compensation.long.tile_files import TileFiles
+from camcomp.compensation.long import field as cubes
+from camcomp.compensation.long.field import Field, TileFiles
 from tests.unit.compensation.long.test_field import ask, machine
 
 TARGET = np.array([[0.0, 0.0, 0.0], [30.0, 5.0, -3.0]])
@@ -86,7 +85,7 @@ def test_cubes_that_fail_the_exact_sample_are_forgotten(router, folder):
 
 
 def test_only_the_newest_files_are_left(router, folder, monkeypatch):
-    monkeypatch.setattr(tile_files, "MOST_FILES", 2)
+    monkeypatch.setattr(cubes, "MOST_FILES", 2)
     for k in range(4):
         known = field(router, 2.0**k * FORCE)
         ask(known, TARGET, FORCE)
