@@ -121,6 +121,15 @@ def test_lines_are_kept_from_being_made_one(orthoglide, mode):
     assert sum(read.modes[k].merge_mm == 0.0 for k in cuts) > 0.9 * len(cuts)
 
 
+def test_lines_are_kept_from_being_made_one_with_joining_lines(orthoglide):
+    """Cuts of 40 short lines with rapids between them: only at their ends is merging beyond the tolerance."""
+    angle = 0.02 * np.arange(300)
+    cuts = [f"G1 X{x:.4f} Y{y:.4f} F3000" for x, y in zip(20.0 * np.cos(angle), 20.0 * np.sin(angle), strict=True)]
+    lines = [line for k in range(0, 300, 40) for line in ("G1 Z0 F600", *cuts[k : k + 40], "G0 Z2")]
+    done = compensated(orthoglide, ["G0 X0 Y0 Z5", *lines], "G64 P0.0005 Q0.01")
+    assert done.control.apart and Totals.of(done, orthoglide).summary().under_control.max_um < 1.0
+
+
 @pytest.mark.parametrize("mode", ["G64 P0.0005", "G64 P0.01 Q0", "G64", ""])
 def test_nothing_is_kept_apart_where_nothing_is_made_one(orthoglide, mode):
     done = compensated(orthoglide, circle(1.0, 600), mode, arcs=False)

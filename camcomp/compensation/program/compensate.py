@@ -38,12 +38,7 @@ from camcomp.compensation.program.posture import check_posture
 from camcomp.compensation.program.programmed import Programmed
 from camcomp.compensation.program.result import Interpolation
 from camcomp.compensation.program.uncertainty import shares_of, tip_moves
-from camcomp.compensation.program.under_control import (
-    UnderControl,
-    may_pay_apart,
-    rests,
-    stays_apart,
-)
+from camcomp.compensation.program.under_control import UnderControl, rests, stays_apart
 from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
@@ -387,9 +382,9 @@ class _Correction:
         )
         control = planned()
         apart = stays_apart(self.program, rows, self.part)
-        if apart.any() and control.stated and may_pay_apart(control, rows, self.part, self.tolerance_um):
+        if apart.any() and control.stated and control.account.errors.most_um > self.tolerance_um:
             other = planned(apart=apart)
-            if self.part is not None or other.better_than(control, self.tolerance_um):
+            if other.nearer_than(control):
                 return self._rewritten(rows, rest, apart), other
         return written, control
 

@@ -20,13 +20,13 @@ from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode, numbered
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
-from camcomp.ground.records import dataclass, fields, replace
+from camcomp.ground.records import dataclass, fields
 from camcomp.ground.source_lines import MOST_LINES, named_lines
 from camcomp.ground.vectors import chosen, largest, sizes
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves, moves_of
-from camcomp.model.trajectory.plan import ControlPlan, plan_of
+from camcomp.model.trajectory.plan import plan_of
 
 if TYPE_CHECKING:
     from camcomp.compensation.program.corrected_rows import CorrectedRows
@@ -238,6 +238,11 @@ class UnderControl:
             return self.after_s < LOST_TIME * other.after_s
         return mine <= 1.05 * theirs and LOST_TIME * self.after_s < other.after_s
 
+    def nearer_than(self, other: UnderControl) -> bool:
+        """Whether its errors are smaller on the whole without losing time."""
+        mine, theirs = (each.account.errors.figures().rms_um for each in (self, other))
+        return mine < theirs and self.after_s < LOST_TIME * other.after_s
+
     @property
     def off_joins(self) -> float:
         """Largest error apart from joining lines, mm."""
@@ -247,7 +252,7 @@ class UnderControl:
     def leaves_room(self, tolerance_um: float) -> bool:
         """Whether another way to write the program might be faster or nearer to the path."""
         return self.stated and (
-            self.after_s > LOST_TIME * self.original.seconds or 1e3 * self.off_joins > tolerance_um * (1.0 + 1e-9)
+            self.after_s > LOST_TIME * self.original.seconds or 1e3 * self.off_joins > tolerance_um * (1.0 + ROUND_OFF)
         )
 
 
@@ -291,41 +296,13 @@ def stays_apart(program: Program, rows: CorrectedRows, part: Part | None) -> Boo
     if part is not None:
         return np.asarray(able[rows.motion])
     cut = np.zeros(len(begins), np.bool_)
-    cut[rows.motion[moved_cuts(rows)]] = True
+    cut[rows.motion[(rows.kind != RAPID) & (largest(rows.end - rows.target) > 0.0)]] = True
     section = np.cumsum(begins)
     first = np.full(int(section.max(initial=0)) + 1, len(begins))
     at = np.flatnonzero(cut & able)
     np.minimum.at(first, section[at], at)
     out: Bools = (able & (np.arange(len(begins)) >= first[section]))[rows.motion]
     return out
-
-
-def may_pay_apart(control: UnderControl, rows: CorrectedRows, part: Part | None, tolerance_um: float) -> bool:
-    """Whether it may pay to keep lines from being made one; in a part, whether it does."""
-    if part is None:
-        return 1e3 * control.off_joins > tolerance_um * (1.0 + 1e-9)
-    own = slice(*np.searchsorted(rows.motion, (part.first, part.last)).tolist())
-    cut = (moved_cuts(rows) & ~rows.joining)[own]
-    return bool(cut.any()) and apart_pays(control.written.take(own), cut, control.limits, tolerance_um)
-
-
-def moved_cuts(rows: CorrectedRows) -> Bools:
-    """Cuts (N,) that end elsewhere than programmed."""
-    return np.asarray((rows.kind != RAPID) & (largest(rows.end - rows.target) > 0.0))
-
-
-def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um: float) -> bool:
-    """Whether merging goes too far off on moves (n,) that cut, and they are as fast and nearer to their ends without it."""
-
-    def off(plan: ControlPlan) -> float:
-        at = np.flatnonzero(cut)
-        return 1e3 * float(sizes(plan.leaves_by(at, moves.end[at])).max(initial=0.0))
-
-    merged = plan_of(moves, limits)
-    if off(merged) <= tolerance_um:
-        return False
-    free = plan_of(replace(moves, merge=np.zeros(len(moves))), limits)
-    return off(free) < 0.9 * off(merged) and free.duration_s < LOST_TIME * merged.duration_s
 
 
 def modes_of(program: Program) -> tuple[PathMode, ...]:
