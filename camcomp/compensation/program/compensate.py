@@ -14,7 +14,7 @@ from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.bands.tip_field import tip_field_of
 from camcomp.compensation.program import division
 from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of, times_of
-from camcomp.compensation.program.division import Bend, Nodes, second_derivative, trial_nodes
+from camcomp.compensation.program.division import Bend, Nodes, begins_of, second_derivative, trial_nodes
 from camcomp.compensation.program.judged_points import (
     Division,
     JudgedPoints,
@@ -198,7 +198,7 @@ class _Correction:
             piece, w, of = without_shared_ends(track, piece, w)
         points = of
         if self.job.causes:
-            begin = np.where(np.diff(piece, prepend=-1) == 0, np.append(0.0, w[:-1]), 0.0)
+            begin = begins_of(piece, w)
             way = (w - begin) * track.length[piece]
             rapid = (track.path.kind[track.motion[piece]] == RAPID) & (way > 0.0)
             node, share = points_inside(self.job, rapid, way)

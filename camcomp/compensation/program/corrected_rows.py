@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.compensation.program.division import Nodes, sweeps
+from camcomp.compensation.program.division import Nodes, begins_of, sweeps
 from camcomp.compensation.program.moves import refuse_unsolved, row_layout
 from camcomp.compensation.program.programmed import Programmed
 from camcomp.gcode.output import Output
@@ -129,9 +129,7 @@ def _behind_cuts(asked: Programmed, piece: Ints) -> tuple[Floats, Floats]:
 def _feeds(program: Program, track: Track, rows: CorrectedRows, commanded: Floats) -> Floats:
     """Feed of every row so that the tip keeps its programmed speed: scaled by commanded (N,) mm over programmed length."""
     feed = program.path.feed[rows.motion]
-    same = np.concatenate(([False], (rows.piece[1:] == rows.piece[:-1])))
-    w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
-    programmed = (rows.w - w0) * track.length[rows.piece]
+    programmed = (rows.w - begins_of(rows.piece, rows.w)) * track.length[rows.piece]
     scale = np.divide(commanded, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
     unscaled = rows.joining | ((rows.kind != LINE) & ~rows.bent) | ~rows.corrected | (programmed < 0.01)
     return np.where(unscaled, feed, feed * np.clip(scale, 0.2, 5.0))

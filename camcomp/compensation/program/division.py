@@ -45,14 +45,20 @@ class Nodes:
         return at, np.flatnonzero(known[at] != own)
 
 
+def begins_of(piece: Ints, w: Floats) -> Floats:
+    """Fractions (k,) where the moves to points at fractions w (k,) of pieces begin: at the point before, or the piece."""
+    return np.where(np.diff(piece, prepend=-1) == 0, np.append(0.0, w[:-1]), 0.0)
+
+
 def trial_nodes(length: Floats, angle: Floats, divide: np.ndarray, spacing: float = COARSE_MM) -> Nodes:
     """At least three nodes where `divide`, one every `spacing` mm of length (p,) and 15 degrees of arc (p,); two elsewhere."""
     along = np.ceil(length / spacing) * (length > 0.25 * spacing)
     count = np.where(divide, 3 + along + np.ceil(np.abs(angle) / 0.26), 2)
-    return _spread(count.astype(np.int64))
+    return even_nodes(count.astype(np.int64))
 
 
-def _spread(count: Ints) -> Nodes:
+def even_nodes(count: Ints) -> Nodes:
+    """So many nodes (p,) of every piece at even distances, its ends among them."""
     first = np.concatenate(([0], np.cumsum(count)))
     piece = np.repeat(np.arange(len(count)), count)
     k = np.arange(first[-1]) - first[piece]
@@ -89,7 +95,7 @@ def divide(nodes: Nodes, second: Floats, tolerance: Floats, least: Floats | None
     slack = 2.0 * (1.0 - END_STEP)
     count = np.maximum(np.ceil(total / np.sqrt(SHARE * tolerance) + slack - 1e-9).astype(np.int64), 2)
     count[total <= np.sqrt(SINGLE * tolerance)] = 1
-    out = _spread(count + 1)
+    out = even_nodes(count + 1)
     n = count[out.piece]
     k = np.arange(len(out.w)) - out.first[out.piece]
     inner = (k > 0) & (k < n)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.compensation.program.corrected_rows import CorrectedRows
+from camcomp.compensation.program.division import begins_of
 from camcomp.compensation.program.line_ends import points_inside
 from camcomp.compensation.program.orienting import Orienting
 from camcomp.compensation.program.programmed import Programmed
@@ -31,10 +32,7 @@ class JudgedPoints:
         """Feeding (p,): pieces on which points between end points are looked at."""
         job, track, n = asked.job, asked.track, len(rows.piece)
         cut = feeding[rows.piece] & ~rows.joining
-        begins = np.concatenate(([True], rows.piece[1:] != rows.piece[:-1])) | np.concatenate(
-            ([True], rows.joining[:-1])
-        )
-        start = np.where(begins, 0.0, np.concatenate(([0.0], rows.w[:-1])))
+        start = begins_of(rows.piece, rows.w)
         inner = np.flatnonzero(cut & (track.length[rows.piece] > 0.0))
         bent = inner[rows.bent[inner]]
         way = np.where(cut, (rows.w - start) * track.length[rows.piece], 0.0)

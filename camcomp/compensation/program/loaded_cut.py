@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from camcomp.compensation.program.division import even_nodes
 from camcomp.compensation.program.moves import refuse_unsolved, travel_of
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry
@@ -128,9 +129,8 @@ class Way:
         radius = np.divide(track.length, angle, out=np.full(n, np.inf), where=angle > 0.0)
         step = np.minimum(step_mm, np.sqrt(8.0 * SAGITTA_MM * radius))
         count = np.where(feeds, np.maximum(np.ceil(track.length / np.maximum(step, 1e-3)), 1), 1).astype(np.int64) + 1
-        self.piece = piece = np.repeat(np.arange(n), count)
-        k = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
-        self.w = w = k / (count[piece] - 1)
+        nodes = even_nodes(count)
+        self.piece, self.w = piece, w = nodes.piece, nodes.w
         self.told = track.points(piece, w)  # (k, 3) mm programmed tip
         self.direction = _directions(
             track, feeds, piece, w

@@ -14,7 +14,7 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import BandTotals, band_figures
 from camcomp.compensation.bands.tip_field import tip_field_of
-from camcomp.compensation.program.division import trial_nodes
+from camcomp.compensation.program.division import even_nodes, trial_nodes
 from camcomp.compensation.program.line_ends import LOOP_MM, is_late
 from camcomp.compensation.program.matching import Matching
 from camcomp.compensation.program.moves import (
@@ -143,10 +143,8 @@ def _samples(path: Path, pieces: Ints, first: Ints, last: Ints) -> tuple[Ints, I
     count = np.where(
         path.kind[move] == RAPID, len(WITHIN_RAPID) + 1, PER_SECTION * np.maximum(sections, 1).astype(np.int64)
     )
-    points = count + 1
-    begin = np.cumsum(points) - points
-    k = np.arange(points.sum()) - np.repeat(begin, points)
-    return np.repeat(piece, points), np.repeat(move, points), k / np.repeat(count, points)
+    nodes = even_nodes(count + 1)
+    return piece[nodes.piece], move[nodes.piece], nodes.w
 
 
 class _Original(Programmed):
@@ -159,7 +157,7 @@ class _Original(Programmed):
             begin, end = (self._commanded(np.arange(count), np.full(count, w)) for w in (0.0, 1.0))
             return begin, end
         long = corrected_pieces(track.path, track) & (track.length > LOOP_MM)
-        nodes = trial_nodes(track.length, self._angle(), long, LOOP_MM)
+        nodes = trial_nodes(track.length, track.angle, long, LOOP_MM)
         piece, w, of = without_shared_ends(track, nodes.piece, nodes.w)
         out = self._commanded(piece, w).take(of, axis=0)
         return out[nodes.first[:-1]], out[nodes.first[1:] - 1]
@@ -173,17 +171,10 @@ class _Original(Programmed):
         out[on] = result.commanded
         return self.taken(piece, w, out)
 
-    def _angle(self) -> Floats:
-        """Angles (p,) rad of the pieces that are arcs, else zero."""
-        path, track = self.track.path, self.track
-        angle = np.where(path.kind == ARC, np.abs(path.angle), 0.0)[track.motion] * (track.u1 - track.u0)
-        return np.asarray(angle)
-
     def reach(self) -> Floats:
         """Length (p,) mm of the commanded path of every piece; where the correction is large, a small arc grows or shrinks."""
         track, corrected = self.track, corrected_pieces(self.track.path, self.track)
-        angle = self._angle()
-        nodes = trial_nodes(track.length, angle, corrected & (angle > 0.0))
+        nodes = trial_nodes(track.length, track.angle, corrected & (track.angle != 0.0))
         points = track.points(nodes.piece, nodes.w)
         on = corrected[nodes.piece]
         points[on] = self.aim(nodes.piece[on], nodes.w[on])[0].commanded
