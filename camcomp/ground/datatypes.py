@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camcomp.ground.records import dataclass, fields
+from camcomp.ground.records import Rows, dataclass
 
 if TYPE_CHECKING:
     from camcomp.ground.orientation import Orientation
@@ -46,7 +45,7 @@ def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Curves:
+class Curves(Rows):
     """Lines and arcs (n,) of the tool tip, mm, program frame."""
 
     kind: NDArray[np.int8]  # (n,) RAPID, LINE or ARC
@@ -88,15 +87,3 @@ class Path(Curves):
 
     def __len__(self) -> int:
         return int(self.line.shape[0])
-
-    @classmethod
-    def joined(cls, parts: Sequence[Path]) -> Path:
-        """Concatenation of paths without orientation."""
-        names = [each.name for each in fields(cls) if each.name != "orientation"]
-        columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-        return cls(**columns)
-
-    def take(self, rows: NDArray[Any] | slice) -> Path:
-        """The motions with indices, mask or slice `rows`."""
-        columns = {each.name: getattr(self, each.name)[rows] for each in fields(self) if each.name != "orientation"}
-        return Path(**columns, orientation=None if self.orientation is None else self.orientation.take(rows))

@@ -12,12 +12,10 @@ Sources: LinuxCNC, posemath, pmRpyMatConvert; Siemens, Sinumerik 840D sl Job Pla
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.ground.records import dataclass
+from camcomp.ground.records import Rows, dataclass
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,16 +28,12 @@ _SAME_DIRECTION = 1e-12  # of the sine between two directions
 
 
 @dataclass(frozen=True, eq=False)
-class Orientation:
+class Orientation(Rows):
     """Words (n, 3) of n motions at their starts and ends; deg for rpy and turn, a unit vector for vector."""
 
     form: str
     start: Floats
     end: Floats
-
-    def take(self, rows: NDArray[Any] | slice) -> Orientation:
-        """Orientation of some motions."""
-        return Orientation(self.form, self.start[rows], self.end[rows])
 
     def words(self, motion: Ints, u: Floats) -> Floats:
         """Words (k, 3) at fractions u (k,) of motions (k,)."""

@@ -193,7 +193,7 @@ def test_the_control_rests_between_cuts_and_joining_lines(orthoglide):
     text = done.written.data.decode().splitlines()
     assert [each for each in text if each.startswith("G6")] == ["G64", "G61", "G64", "G61", "G64"]
     assert done.control.rest.sum() == 4
-    assert np.nanmax(sizes(done.control.account.latest[done.control.points.joined])) <= 1e-3
+    assert np.nanmax(sizes(done.control.account.latest[done.control.points.at_join])) <= 1e-3
     assert any(each.startswith("G61 is written at 4 ends") for each in Totals.of(done, orthoglide).warnings)
     read = read_program(done.written.data, name="out.nc", setup=setup_of(orthoglide.config))
     rests = np.flatnonzero([mode.exact for mode in read.modes])

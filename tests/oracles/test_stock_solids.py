@@ -85,7 +85,7 @@ def wanted_arcs(block, kind, tip, way, lift, count=1440):
 
 def slices(engaged, row):
     """Of a place: height (middle, mm over the tip) and sum of the arcs (rad) of every slice in which the tool was looked at."""
-    arcs = engaged.arcs.of(np.array([row]))
+    arcs = engaged.arcs.take(np.array([row]))
     new = np.concatenate(([True], arcs.start[1:] < arcs.stop[:-1]))  # arcs of a slice stand in order
     height = arcs.height[new]
     turn = np.bincount(np.cumsum(new) - 1, arcs.stop - arcs.start)
@@ -95,7 +95,7 @@ def slices(engaged, row):
 
 def flat_slice(engaged, row):
     """The same for a cylinder, whose arcs all begin at its tip."""
-    arcs = engaged.arcs.of(np.array([row]))
+    arcs = engaged.arcs.take(np.array([row]))
     lift = 0.4 * engaged.depth[row]
     return np.array([lift]), np.array([(arcs.stop - arcs.start)[arcs.height > lift].sum()])
 

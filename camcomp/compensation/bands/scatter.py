@@ -11,22 +11,18 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.records import dataclass
+from camcomp.ground.records import Rows, dataclass
 
 LEVEL = 0.95  # of the machines drawn: what a band promises
 LEAST_BETTER = 0.995  # of the machines drawn are not worse off by a share of the correction than without it
 
 
 @dataclass(frozen=True, eq=False)
-class TipMoves:
+class TipMoves(Rows):
     """How loaded tips (n) move with k inputs: mm per deviation, and mm per deviation squared, program frame."""
 
     slope: Floats  # (n, 3, k)
     bend: Floats  # (n, 3, k)
-
-    def take(self, rows: np.ndarray) -> TipMoves:
-        """Some of the tips."""
-        return TipMoves(self.slope[rows], self.bend[rows])
 
     @cached_property
     def mean(self) -> Floats:

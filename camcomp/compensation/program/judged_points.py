@@ -14,7 +14,7 @@ from camcomp.compensation.program.programmed import Programmed
 from camcomp.gcode.output import Rewritten
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
-from camcomp.ground.records import dataclass, fields, replace
+from camcomp.ground.records import dataclass, replace
 from camcomp.ground.vectors import largest_of_groups, sizes
 from camcomp.model.job import Job
 from camcomp.model.motion.response import aim_pose, respond
@@ -115,8 +115,7 @@ def commanded_travel(points: JudgedPoints, orienting: Orienting | None, words: F
 
 
 def _seen(points: JudgedPoints, tip: Floats, state: Correction, tilt: Floats | None = None) -> Seen:
-    at = {each.name: getattr(state, each.name).compress(points.end, axis=0) for each in fields(state)}
-    return Seen(tip - points.target, state.status, tip.compress(points.end, axis=0), Correction(**at), tilt)
+    return Seen(tip - points.target, state.status, tip.compress(points.end, axis=0), state.take(points.end), tilt)
 
 
 def see_original(job: Job, points: JudgedPoints) -> Seen:

@@ -135,7 +135,7 @@ class Totals:
             return
         before, after = self._accounts
         before.add(control.programmed.take(slice(part.first, part.last)))
-        after.add(control.written.take(own), control.points.take(slice(None), own.start))
+        after.add(control.written.take(own), control.points.behind(-own.start))
 
     def finish(self, language: Dialect, read: Sequence[str], waiting_s: float) -> None:
         """Collect the warnings of all parts behind those of the reader (`read`); waiting_s: besides the moves."""

@@ -20,7 +20,7 @@ from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode, numbered
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
-from camcomp.ground.records import dataclass, fields
+from camcomp.ground.records import Rows, dataclass, replace
 from camcomp.ground.source_lines import MOST_LINES, named_lines
 from camcomp.ground.vectors import chosen, largest, sizes
 from camcomp.model.control import limits_of, waiting_s
@@ -65,29 +65,23 @@ class FarOff:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PointsOnMoves:
+class PointsOnMoves(Rows):
     """Points (k,) on moves of the written program, and the tip errors there before the controller."""
 
     move: Ints  # that leads to the point, ascending
     commanded: Floats  # (k, 3) mm
     error: Floats  # (k, 3) mm
     line: Ints  # of the source
-    joined: Bools  # next to a joining line
+    at_join: Bools  # next to a joining line
 
-    def take(self, rows: slice, shift: int = 0) -> PointsOnMoves:
-        """Some of them, their moves counted from `shift`."""
-        parts = {each.name: getattr(self, each.name)[rows] for each in fields(self)}
-        return PointsOnMoves(**{**parts, "move": parts["move"] - shift})
-
-    @classmethod
-    def joint(cls, parts: list[PointsOnMoves]) -> PointsOnMoves:
-        """Concatenation of several lists of points."""
-        return cls(**{each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(cls)})
+    def behind(self, moves: int) -> PointsOnMoves:
+        """The points, their moves counted from so many before them."""
+        return replace(self, move=self.move + moves)
 
 
 _NO_POINTS = PointsOnMoves(
     move=np.zeros(0, np.int64), commanded=np.zeros((0, 3)), error=np.zeros((0, 3)), line=np.zeros(0, np.int64),
-    joined=np.zeros(0, np.bool_),
+    at_join=np.zeros(0, np.bool_),
 )  # fmt: skip
 
 
@@ -119,7 +113,7 @@ class ControlAccount:
         """Moves behind those before; points: on them."""
         if not len(moves):
             return
-        self._points.append(points.take(slice(None), -self._waiting))
+        self._points.append(points.behind(self._waiting))
         self._moves.append(moves)
         self._waiting += len(moves)
         if self._waiting >= STRETCH + 2 * IN_SIGHT:
@@ -137,7 +131,7 @@ class ControlAccount:
         end = int(plan.group[until - 1]) + 1 if until == len(moves) else int(plan.group[until])
         until = int(np.searchsorted(plan.group, end))
         self.seconds += float(plan.time[begin:end].sum())
-        points = self._points[0] if len(self._points) == 1 else PointsOnMoves.joint(self._points)
+        points = self._points[0] if len(self._points) == 1 else PointsOnMoves.joined(self._points)
         first, last = np.searchsorted(points.move, (self._planned, until)).tolist()
         chosen = points.take(slice(first, last))
         self._judge(chosen, chosen.error + plan.leaves_by(chosen.move, chosen.commanded))
@@ -145,7 +139,7 @@ class ControlAccount:
         if keep < len(moves):
             self._arrives = float(plan.passes[plan.group[keep]])
             self._moves = [moves.take(slice(keep, None))]
-            self._points = [points.take(slice(last, None), keep)]
+            self._points = [points.take(slice(last, None)).behind(-keep)]
         self._waiting, self._planned = len(moves) - keep, until - keep
 
     def _judge(self, points: PointsOnMoves, error: Floats) -> None:
@@ -155,7 +149,7 @@ class ControlAccount:
         size = sizes(error)
         far = np.flatnonzero(np.isfinite(size) & (size > self.tolerance * (1.0 + ROUND_OFF)))
         if len(far):
-            size, joined = 1e3 * size[far], points.joined[far]
+            size, joined = 1e3 * size[far], points.at_join[far]
             self.at_joins = self.at_joins.with_more(points.line[far[joined]], size[joined])
             self.elsewhere = self.elsewhere.with_more(points.line[far[~joined]], size[~joined])
 
@@ -208,7 +202,7 @@ class UnderControl:
         joining = np.concatenate((rows.joining, [False]))
         self.points = PointsOnMoves(
             move=row, commanded=chosen(found.commanded, judged), error=chosen(found.missed, judged),
-            line=program.path.line[rows.motion[row]], joined=joining[row - 1] | joining[row + 1],
+            line=program.path.line[rows.motion[row]], at_join=joining[row - 1] | joining[row + 1],
         )  # fmt: skip
 
     @cached_property
@@ -246,7 +240,7 @@ class UnderControl:
     @property
     def off_joins(self) -> float:
         """Largest error apart from joining lines, mm."""
-        size = sizes(self.account.latest[~self.points.joined])
+        size = sizes(self.account.latest[~self.points.at_join])
         return float(np.nanmax(size, initial=0.0))
 
     def leaves_room(self, tolerance_um: float) -> bool:
@@ -338,7 +332,11 @@ def of_text(
     """
     limits = limits_of(job.config)
     points = PointsOnMoves(
-        move=move, commanded=told, error=error, line=np.zeros(len(move), np.int64), joined=np.zeros(len(move), np.bool_)
+        move=move,
+        commanded=told,
+        error=error,
+        line=np.zeros(len(move), np.int64),
+        at_join=np.zeros(len(move), np.bool_),
     )
     accounts = [
         ControlAccount.of(programmed_moves(original, job), limits),

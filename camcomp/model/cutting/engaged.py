@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Self
 
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats, Ints, Path
-from camcomp.ground.records import dataclass, replace
+from camcomp.ground.records import Rows, dataclass, replace
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class EngagementArcs:
+class EngagementArcs(Rows):
     """Engagement arcs (b,) of a tool's turn, several per place if the material has several heights.
 
     Angles count as in engagement.py for a clockwise spindle. rise, run: of the tool's surface per length of its edge;
@@ -25,32 +26,16 @@ class EngagementArcs:
     rise: Floats
     run: Floats
 
-    def of(self, rows: Ints) -> EngagementArcs:
+    def take(self, rows: Ints) -> Self:
         """The arcs of some places (r,), renumbered from 0."""
         if len(rows) and rows[-1] - rows[0] + 1 == len(rows) and bool((np.diff(rows) == 1).all()):
             a, b = np.searchsorted(self.place, (rows[0], rows[-1] + 1)).tolist()
-            own = slice(a, b)
-            fresh = self.place[own] - rows[0]
-            return EngagementArcs(
-                place=fresh,
-                start=self.start[own],
-                stop=self.stop[own],
-                height=self.height[own],
-                rise=self.rise[own],
-                run=self.run[own],
-            )
+            return replace(super().take(slice(a, b)), place=self.place[a:b] - rows[0])
         first = np.searchsorted(self.place, rows, "left")
         count = np.searchsorted(self.place, rows, "right") - first
         at = np.repeat(first - np.concatenate(([0], np.cumsum(count)[:-1])), count) + np.arange(count.sum())
         fresh = np.repeat(np.arange(len(rows)), count)
-        return EngagementArcs(
-            place=fresh,
-            start=self.start[at],
-            stop=self.stop[at],
-            height=self.height[at],
-            rise=self.rise[at],
-            run=self.run[at],
-        )
+        return replace(super().take(at), place=fresh)
 
     def reach(self, places: int) -> Floats:
         """Extent (places,) of the arcs of every place across the feed, in radii of the tool."""
@@ -66,7 +51,7 @@ class EngagementArcs:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Engaged:
+class Engaged(Rows):
     """Places (k,) along the motions of a path, in order, with the engagement arcs; between them the engagement is linear.
 
     Two places at one fraction of a motion are a jump. Motions without places do not cut.
@@ -80,35 +65,12 @@ class Engaged:
     arcs: EngagementArcs
 
     @classmethod
-    def joined(cls, parts: list[Engaged]) -> Engaged:
+    def joined(cls, parts: Sequence[Self]) -> Self:
         """Concatenation of consecutive parts."""
-        first = np.cumsum([0] + [len(each.u) for each in parts])
-        arcs = EngagementArcs(
-            place=np.concatenate([each.arcs.place + n for each, n in zip(parts, first, strict=False)]),
-            start=np.concatenate([each.arcs.start for each in parts]),
-            stop=np.concatenate([each.arcs.stop for each in parts]),
-            height=np.concatenate([each.arcs.height for each in parts]),
-            rise=np.concatenate([each.arcs.rise for each in parts]),
-            run=np.concatenate([each.arcs.run for each in parts]),
-        )
-        return cls(
-            motion=np.concatenate([each.motion for each in parts]),
-            u=np.concatenate([each.u for each in parts]),
-            depth=np.concatenate([each.depth for each in parts]),
-            turn=np.concatenate([each.turn for each in parts]),
-            bends=np.concatenate([each.bends for each in parts]),
-            arcs=arcs,
-        )
-
-    def take(self, rows: Ints) -> Engaged:
-        """Some of the places."""
-        return Engaged(
-            motion=self.motion[rows],
-            u=self.u[rows],
-            depth=self.depth[rows],
-            turn=self.turn[rows],
-            bends=self.bends[rows],
-            arcs=self.arcs.of(rows),
+        before = np.cumsum([0] + [len(each.u) for each in parts[:-1]])
+        places = [each.arcs.place + n for each, n in zip(parts, before, strict=True)]
+        return super().joined(
+            [replace(each, arcs=replace(each.arcs, place=at)) for each, at in zip(parts, places, strict=True)]
         )
 
     def of_motions(self, first: int, last: int, number: int = 0) -> Engaged:

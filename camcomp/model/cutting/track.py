@@ -219,7 +219,7 @@ class Track:
         seen = _in_tool_frame(self.path, motion, u, direction[on])
         s = self.s0[piece[on]] + w[on] * self.length[piece[on]]
         for rows, part in ((left, 1.0 - share), (right, share)):
-            arcs = self.engaged.arcs.of(rows)
+            arcs = self.engaged.arcs.take(rows)
             reach, depth = arcs.reach(len(rows)), self.engaged.depth[rows]
             found = _components(
                 path=self.path,
@@ -268,7 +268,7 @@ def _components(
                 to_machine=np.eye(3) if c.to_machine is None else c.to_machine,
                 ends=ends[at],
                 turn=path.turn[motion[at]],
-                arcs=arcs if arcs is None or isinstance(at, slice) else arcs.of(at),
+                arcs=arcs if arcs is None or isinstance(at, slice) else arcs.take(at),
             )
         )
     return out
@@ -283,7 +283,7 @@ def base_of(path: Path, c: Conditions, engaged: Engaged, length: Floats) -> Floa
     rows = np.flatnonzero(near)
     base = np.zeros((len(engaged.u), 3))
     if len(rows) and not c.plunges:
-        where, u, arcs = engaged.motion[rows], engaged.u[rows], engaged.arcs.of(rows)
+        where, u, arcs = engaged.motion[rows], engaged.u[rows], engaged.arcs.take(rows)
         direction = _in_tool_frame(path, where, u, path_geometry.tangents(path, where, u))
         s = np.concatenate(([0.0], np.cumsum(length)))[where] + u * length[where]
         base[rows] = _components(

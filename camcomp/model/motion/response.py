@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats
-from camcomp.ground.records import fields, replace
+from camcomp.ground.records import replace
 from camcomp.ground.vectors import largest
 from camcomp.model import signal_path
 from camcomp.model.effect import Load, Motion
@@ -98,7 +98,7 @@ def respond(
             job, np.concatenate((before[None], commanded)), travel.take(rows), other, rho=rho, tips_only=tips_only,
             latest=latest,
         )  # fmt: skip
-        return tip[1:], Correction(**{each.name: getattr(found, each.name)[1:] for each in fields(found)})
+        return tip[1:], found.take(slice(1, None))
     told = job.frame.to_machine(commanded)
     aim = None if nominal_of is None else job.frame.to_machine(nominal_of)
     if not job.causes:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.ground.records import dataclass, replace
+from camcomp.ground.records import Rows, dataclass, replace
 from camcomp.model.statics.arm import NEAR_SINGULAR, arm_of, dexterity
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.rigid import MAX_ITERATIONS, SINGULAR
@@ -23,7 +23,7 @@ MAX_TARGET_STEPS = 60
 
 
 @dataclass(frozen=True, kw_only=True)
-class Correction:
+class Correction(Rows):
     """Solved targets. Rows with status != 0 hold NaN.
 
     commanded (n, 3) tip to be commanded, mm; rho_nominal, rho (n, m) actuator coordinates of the requested and of the

@@ -56,7 +56,7 @@ def _widths(config: Config, path: Path, engaged: Engaged, on: Ints) -> Floats:
     diameters = {number: each.diameter_mm for number, each in config.tools.items()}
     own = config.tool.diameter_mm
     diameter = _by_tool(path.tool[engaged.motion[on]], diameters, own, np.nan)
-    out: Floats = engaged.arcs.of(on).reach(len(on)) * 0.5 * diameter
+    out: Floats = engaged.arcs.take(on).reach(len(on)) * 0.5 * diameter
     return out
 
 

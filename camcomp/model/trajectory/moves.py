@@ -36,15 +36,6 @@ class ToolMoves(Curves):
     def __len__(self) -> int:
         return len(self.kind)
 
-    def take(self, rows: np.ndarray | slice) -> ToolMoves:
-        """Some of the moves, in the given order."""
-        return ToolMoves(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
-
-    @classmethod
-    def joined(cls, parts: Sequence[ToolMoves]) -> ToolMoves:
-        """Concatenation of several lists of moves."""
-        return cls(**{each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(cls)})
-
 
 def moves_of(
     path: Path, modes: Sequence[PathMode], feed: Floats | None = None, per_turn: Bools | None = None

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from camcomp.ground.datatypes import Path, frozen
+from camcomp.ground.orientation import RPY, Orientation
 
 
 def path(n=2, **changes):
@@ -40,3 +41,12 @@ def test_take_picks_motions():
 
 def test_frozen_keeps_the_number_of_dimensions():
     assert frozen(1.5).shape == ()
+
+
+def test_records_in_records_are_taken_and_joined_with_them():
+    oriented = path(3, orientation=Orientation(RPY, np.zeros((3, 3)), np.arange(9.0).reshape(3, 3)))
+    some = oriented.take([0, 2])
+    both = Path.joined([some, oriented])
+    assert len(both) == 5 and both.orientation.form == RPY
+    assert both.orientation.end[:, 0].tolist() == [0.0, 6.0, 0.0, 3.0, 6.0]
+    assert Path.joined([path(1), path(2)]).orientation is None

@@ -29,7 +29,7 @@ def arcs_at(engaged, motion, u):
     """Arcs (entry, exit, height) and depth at the place of a motion that is nearest to u."""
     rows = np.flatnonzero(engaged.motion == motion)
     row = rows[np.argmin(np.abs(engaged.u[rows] - u))]
-    arcs = engaged.arcs.of(np.array([row]))
+    arcs = engaged.arcs.take(np.array([row]))
     return float(engaged.u[row]), np.column_stack((arcs.start, arcs.stop, arcs.height)), float(engaged.depth[row])
 
 
@@ -187,7 +187,7 @@ def test_a_ball_beside_its_own_groove_meets_what_stands_on_its_other_side():
     )  # fmt: skip
     engaged = follow(path, kind="ball")
     rows = np.flatnonzero(engaged.motion == 4)[-1:]
-    arcs = engaged.arcs.of(rows)
+    arcs = engaged.arcs.take(rows)
     # the old groove, right of the feed, is in every slice as wide as the ball: y < r takes 1 + r cos(psi) < r away
     top = np.cumsum(arcs.height)
     low = engaged.depth[rows[0]] - top[-1]
