@@ -186,15 +186,17 @@ class LongProgram:
         assert result.written.behind is not None
         self._output = result.written.behind
 
-        def tell() -> JointTableRows:
+        def add_up() -> None:
             rows = self.totals.add(result, own, part)
             if job is not self.job:
                 drawn = result.rows.corrected[own] & (self._random.random(len(rows.s)) < self._share)
                 target = self.job.frame.to_machine(rows.target[drawn])
                 self._sample.append(np.concatenate((target, rows.force[drawn]), axis=1))
-            return rows
+            if self.on_rows is not None:
+                self.on_rows(rows)
 
-        self._tell(tell)
+        self._told.result()
+        self._told = self._beside.submit(add_up)  # while the next piece is computed; one at a time, in order
         return result.written.data
 
     def _engagement_of(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> Engaged | None:
@@ -209,17 +211,6 @@ class LongProgram:
             behind = first + len(piece.path)
             parts.append(_still(after.engaged.of_motions(after.ends[0], after.ends[0] + 1), 0, behind))
         return Engaged.joined(parts)
-
-    def _tell(self, batch: Callable[[], JointTableRows]) -> None:
-        """Add up a piece and pass on its rows while the next piece is computed; one piece at a time, in order."""
-
-        def tell() -> None:
-            rows = batch()
-            if self.on_rows is not None:
-                self.on_rows(rows)
-
-        self._told.result()
-        self._told = self._beside.submit(tell)
 
 
 def _count_of(byte: bytes, data: bytes) -> int:

@@ -126,12 +126,10 @@ def cut_at_stops(job: Job, track: Track) -> Track:
     begins = np.diff(np.cumsum(track.corner)[real], prepend=0) > 0
     feed = corrected_pieces(track.path, track) & (track.path.kind[track.motion] != RAPID)
     able = (feed & (track.length > 4.0 * LEADING_MM))[real]
-    places: list[Place] = []
-    for i in real[begins & able].tolist():
-        places.append((i, max(LEADING_MM / track.length[i], 2.0 * LEAST)))
-    for i in real[np.append(begins[1:], True) & able].tolist():
-        places.append((i, 1.0 - max(LEADING_MM / track.length[i], 2.0 * LEAST)))
-    return cut_at(track, places)
+    near = np.maximum(LEADING_MM / np.maximum(track.length, LEADING_MM), 2.0 * LEAST)
+    behind, before = real[begins & able], real[np.append(begins[1:], True) & able]
+    piece, w = np.concatenate((behind, before)), np.concatenate((near[behind], 1.0 - near[before]))
+    return cut_at(track, zip(piece.tolist(), w.tolist(), strict=True))
 
 
 def _instants(cause: Cause) -> list[float]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import BandTotals, band_figures
 from camcomp.compensation.bands.tip_field import tip_field_of
-from camcomp.compensation.program.division import even_nodes, trial_nodes
+from camcomp.compensation.program.division import COARSE_MM, even_nodes, trial_nodes
 from camcomp.compensation.program.line_ends import LOOP_MM, is_late
 from camcomp.compensation.program.matching import Matching
 from camcomp.compensation.program.moves import (
@@ -44,6 +44,9 @@ from camcomp.model.motion.travel import Travel
 
 PER_SECTION = 4  # points looked at within each straight move or section of an arc
 ARC_STEP = 0.1  # rad, section of an arc
+LOOKS = 4  # of points far from the path, for another place on it
+FAR_MM = 1e-3  # from the path
+MANY = 0.1  # of the points: so many are far because of the program, not of their guess
 MATCH_PASSES = 20  # tip and force settle on a place of the path; on a circle of 1 mm it takes ten
 ALONG = 180  # sections of a piece to measure the path that ought to be commanded
 UNEVEN = 0.02  # change of a piece's length by the correction from which that is worth while
@@ -92,10 +95,10 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
         track = shares.with_jumps(track)
     asked = _Original(original, job, track, shares, Orienting.of(original, job, corrected))
     with part(0.0, 0.3, points=True):
-        begin, expected = asked.commanded_ends()
+        begin, expected, reach = asked.commanded()
     step = sizes(begin - np.concatenate((original.path.start[:1], expected[:-1])))
     layout = row_layout(original.path, track, step, original.step_mm(job.config.control.resolution_mm))
-    reach, foreign = asked.reach(), _other_model(corrected, job)
+    foreign = _other_model(corrected, job)
     matching = Matching(
         path=corrected.path, track=track, expected=expected, reach=reach, layout=layout,
         stamped=is_stamped(corrected.data),
@@ -150,37 +153,23 @@ def _samples(path: Path, pieces: Ints, first: Ints, last: Ints) -> tuple[Ints, I
 class _Original(Programmed):
     """The original program as it ought to be corrected; pieces (p,) of its track."""
 
-    def commanded_ends(self) -> tuple[Floats, Floats]:
-        """Commanded tips (p, 3) at begin and end of every piece, as compensate would have them."""
-        track, count = self.track, len(self.track.motion)
-        if not is_late(self.job):
-            begin, end = (self._commanded(np.arange(count), np.full(count, w)) for w in (0.0, 1.0))
-            return begin, end
-        long = corrected_pieces(track.path, track) & (track.length > LOOP_MM)
-        nodes = trial_nodes(track.length, track.angle, long, LOOP_MM)
+    def commanded(self) -> tuple[Floats, Floats, Floats]:
+        """Commanded tips (p, 3) at begin and end of every piece, as compensate would have them, and lengths (p,) mm between.
+
+        Where the correction is large, a small arc grows or shrinks.
+        """
+        track, corrected, late = self.track, corrected_pieces(self.track.path, self.track), is_late(self.job)
+        inner = corrected & ((track.angle != 0.0) | (late & (track.length > LOOP_MM)))
+        nodes = trial_nodes(track.length, track.angle, inner, LOOP_MM if late else COARSE_MM)
         piece, w, of = without_shared_ends(track, nodes.piece, nodes.w)
-        out = self._commanded(piece, w).take(of, axis=0)
-        return out[nodes.first[:-1]], out[nodes.first[1:] - 1]
-
-    def _commanded(self, piece: Ints, w: Floats) -> Floats:
-        """Commanded tips (k, 3) at fractions w (k,) of pieces."""
-        out = self.track.points(piece, w)
-        on = np.flatnonzero(corrected_pieces(self.track.path, self.track)[piece])
+        points, on = track.points(piece, w), np.flatnonzero(corrected[piece])
         result, _ = self.aim(piece[on], w[on])
-        refuse_unsolved(self.program, self.track, piece[on], out[on], result.status)
-        out[on] = result.commanded
-        return self.taken(piece, w, out)
-
-    def reach(self) -> Floats:
-        """Length (p,) mm of the commanded path of every piece; where the correction is large, a small arc grows or shrinks."""
-        track, corrected = self.track, corrected_pieces(self.track.path, self.track)
-        nodes = trial_nodes(track.length, track.angle, corrected & (track.angle != 0.0))
-        points = track.points(nodes.piece, nodes.w)
-        on = corrected[nodes.piece]
-        points[on] = self.aim(nodes.piece[on], nodes.w[on])[0].commanded
-        step = sizes(np.diff(points, axis=0))
+        refuse_unsolved(self.program, track, piece[on], points[on], result.status)
+        points[on] = result.commanded
+        points = self.taken(piece, w, points).take(of, axis=0)
         inside = np.diff(nodes.piece) == 0
-        return np.bincount(nodes.piece[1:][inside], step[inside], len(corrected)).astype(np.float64)
+        reach = np.bincount(nodes.piece[1:][inside], sizes(np.diff(points, axis=0))[inside], len(corrected))
+        return points[nodes.first[:-1]], points[nodes.first[1:] - 1], reach.astype(np.float64)
 
 
 class _Points:
@@ -204,6 +193,7 @@ class _Points:
         """
         asked, travel = self.asked, self.asked.travel(self.piece, w)
         travel = travel if self.rotation is None else replace(travel, rotation=self.rotation)
+        travel = replace(travel, time=np.maximum.accumulate(travel.time))  # also where the tip goes back on its path
         tip, _ = respond(asked.job, self.commanded, travel)
         return travel, tip, asked.missed(tip - asked.track.points(self.piece, w), self.piece, w, travel)
 
@@ -232,7 +222,22 @@ class _Points:
         return np.asarray(share)
 
     def matched(self, w: Floats) -> tuple[Floats, Floats]:
-        """Distance (k,) mm of the loaded tip from the path that it ought to follow, and the fraction of the nearest point."""
+        """Distance (k,) mm of the loaded tip from the path that it ought to follow, and the fraction of the nearest point.
+
+        Where loads turn round, fractions may settle on the wrong side: there they start again at that of the point before.
+        """
+        size, best = self._settled(w)
+        for _ in range(LOOKS):
+            far, again = np.flatnonzero(size > FAR_MM), best.copy()
+            again[far] = np.where(self.piece[far] == self.piece[far - 1], best[far - 1], w[far])
+            if (again == best).all() or len(far) > MANY * len(w):
+                break
+            other, there = self._settled(again)
+            size, best = np.where(other < size, (other, there), (size, best))
+        return size, best
+
+    def _settled(self, w: Floats) -> tuple[Floats, Floats]:
+        """`matched` from a first guess on."""
         track, piece = self.asked.track, self.piece
 
         def seen(w: Floats) -> tuple[Floats, Floats]:
