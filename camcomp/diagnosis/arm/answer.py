@@ -105,7 +105,7 @@ def _best(case: PoseCase, calibrate: Callable[[float], float]) -> float:
     if not found.members:
         return 1.0 - calibrate(max(found.places.values(), default=0.0))
     own = set(case.places(found.members))
-    return calibrate(sum(p for m, p in found.sets if own <= set(case.places(m))))
+    return calibrate(sum(p for _, places, p in found.sets if own <= places))
 
 
 def with_unknown(case: PoseCase, named: tuple[FoundCause, ...], word: str) -> tuple[FoundCause, ...]:
@@ -137,7 +137,7 @@ def where(case: PoseCase, word: str) -> Where:
     for part in case.parts:
         size, stage = energy_of(case, part.columns), case.shelf.columns[part.columns[0]].module.STAGE
         stages[stage] = stages.get(stage, 0.0) + size
-        if part.target is not None:
+        if part.target in actuators:
             actuators[part.target] += size
     most: Any = max(stages, key=lambda s: stages[s]) if stages else "structure"
     intervals = _intervals(case) if word == "unknown" else ()

@@ -23,12 +23,11 @@ def alternatives_of(explanation: Explanation) -> list[Members]:
     """Sets nearly as probable as the best one, or that do the same, the best first; supersets of it are no alternatives."""
     data, best = explanation.data, explanation.members
     amount = data.estimate(best)[0] if best else np.zeros(0)
-    top = max((p for m, p in explanation.sets if m == best), default=0.0)
+    top = max((p for m, _, p in explanation.sets if m == best), default=0.0)
     own = {data.candidates[i].place for i in best}
     out: list[Members] = [best]
-    for members, p in explanation.sets:
-        places = {data.candidates[i].place for i in members}
-        if places == own or places > own:
+    for members, places, p in explanation.sets:
+        if places >= own:
             continue
         near = p >= top * np.exp(-EQUAL_LOG_ODDS)
         if not near and len(members) <= len(best) and p >= top * np.exp(-2.0 * EQUAL_LOG_ODDS):

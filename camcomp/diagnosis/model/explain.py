@@ -61,14 +61,15 @@ class KnownNoise:
 class Explanation:
     """The posterior over sets and backgrounds.
 
-    members: the most probable set, beside `background`. sets: members and probability, one entry per set of places, the
-    most probable first; places, families: probability of every place and family; unknown: that something unmodelled acts.
+    members: the most probable set, beside `background`. sets: members, the places of these and of the families beside them, and
+    probability, one entry per set of places, the most probable first; places, families: probability of every place and family;
+    unknown: that something unmodelled acts.
     """
 
     model: LinearModel
     background: Background
     members: Members
-    sets: tuple[tuple[Members, float], ...]
+    sets: tuple[tuple[Members, frozenset[Place], float], ...]
     places: dict[Place, float]
     families: dict[str, float]
     unknown: float
@@ -219,7 +220,7 @@ def posterior_of(
     weighed: dict[Background, dict[Members, float]],
     noise: KnownNoise | None = KnownNoise(),
 ) -> Explanation:
-    """The posterior over everything that was weighed; sets of the same places count as one.
+    """The posterior over everything that was weighed; sets of the same places, those of families included, count as one.
 
     Where the noise is not known it may be a discrepancy of any form: the data do not change the probability of that, and
     beside such a discrepancy they do not determine causes.
@@ -239,12 +240,13 @@ def posterior_of(
             unknown += each * noise.unmodelled(background.noise)
         for name, _ in background.families:
             families[name] = families.get(name, 0.0) + each
-        own = frozenset(model.candidates[i].place for i in members)
+        together = {name for name, _ in background.families}
+        own = frozenset(c.place for i, c in enumerate(model.candidates) if i in members or c.effect in together)
         for place in own:
             places[place] = places.get(place, 0.0) + each
         first, most, total = merged.get(own, (members, 0.0, 0.0))
         merged[own] = (members if each > most else first, max(most, each), total + each)
-    sets = sorted(((m, total) for m, _, total in merged.values()), key=lambda s: -s[1])
+    sets = sorted(((m, own, total) for own, (m, _, total) in merged.items()), key=lambda s: -s[2])
     top = int(np.argmax(value))
     return Explanation(
         model=model, background=flat[top][0], members=flat[top][1], sets=tuple(sets), places=places,
