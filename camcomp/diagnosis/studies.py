@@ -68,9 +68,9 @@ def study_of(file: str | Path | ExperimentFile, without: Sequence[str] = ()) -> 
             if arm_of(robot) is None:
                 return None
             runs = checked_poses(opened)
-            own = _causes(opened.file.config)
-            result, notes = study_arm(robot, own, runs, holdout=holdout, without=without, stated=stated)
-            bench = partial(bench_of, robot, tuple(own), runs, holdout)
+            own, origin = _causes(opened.file.config), np.array(opened.file.config.workpiece.origin_mm, float)
+            result, notes = study_arm(robot, own, runs, holdout=holdout, without=without, stated=stated, origin=origin)
+            bench = partial(bench_of, robot, tuple(own), runs, holdout=holdout, origin=origin)
             return LogStudy(result, partial(of_poses, bench, result), (*opened.notes, *notes))
         if not any(m.has("tip") for m in logs) and all(m.has("encoder") for m in logs):
             axes = checked_axes(opened)

@@ -44,7 +44,8 @@ def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float
     if motion.ordered:
         out[:, aimed] += play(motion.encoder[:, aimed], width, pushed)
     else:
-        out[:, aimed] += 0.5 * width * pushed
+        last = 0.0 if motion.came is None else -motion.came[:, aimed]
+        out[:, aimed] += 0.5 * width * np.where(pushed != 0.0, pushed, last)
     return out
 
 

@@ -96,6 +96,9 @@ class Motion:
     told: Callable[[], Floats] | None = None  # (n, 3) mm, program frame
     cut_before_min: float = 0.0  # part of cut_min in earlier runs
     masses: Callable[[], MassLoads] | None = None
+    came: Floats | None = (
+        None  # (n, m) of standing poses: way in which every drive came there, 1 or -1, 0 where unknown
+    )
     friction: Floats | None = None  # (m,) Coulomb force behind the play of a drive, N or N mm; NaN: not stated
     seams: Seams | None = None  # where a recording begins or goes on in motion; None: it starts at rest
     measured_force: bool = False  # the cutting force is measured, so that errors of a force model do not act
@@ -111,6 +114,7 @@ class Motion:
             encoder=self.encoder[instants],
             speed=self.speed[instants],
             direction=self.direction[instants],
+            came=None if self.came is None else self.came[instants],
             nut=None if self.nut is None else self.nut[instants],
             held=None,
             told=None,

@@ -5,7 +5,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from camcomp.diagnosis.arm.poses import ArmBench, Poses
+from camcomp.diagnosis.arm.poses import ArmBench, Poses, approached
 from camcomp.diagnosis.arm.study import studied
 from camcomp.diagnosis.model.noise import StatedDeviation
 from camcomp.model.config.load import load_config
@@ -39,7 +39,9 @@ def run(name, seed, carried):
     way, turn = carried(at)
     tip = way + Rotation.from_rotvec(turn).apply(stand.point + stand.turn @ [20.0, 40.0, -90.0])
     tip = tip + SD * rng.standard_normal((ROWS, 3))
-    return Poses(label="A", q=np.column_stack([at, q]), tip=tip, time=time, temperature=None, run=np.full(ROWS, name))
+    every = np.column_stack([at, q])
+    way = approached(every, time)
+    return Poses(label="A", q=every, tip=tip, time=time, temperature=None, run=np.full(ROWS, name), approach=way)
 
 
 def answer(robot, carried):
@@ -52,6 +54,16 @@ def test_its_pitch_is_found(robot):
     assert [(c.effect, c.target) for c in result.causes] == [("screw_pitch", "rail")]
     low, high = result.causes[0].parameters["error_ppm"].ci95
     assert low < 120.0 < high and high - low < 40.0
+
+
+def test_play_of_its_rack_is_found(robot):
+    def behind(at):
+        return np.outer(at - 0.15 * np.sign(np.diff(at, prepend=at[0])), [1, 0, 0]), np.zeros((ROWS, 3))
+
+    result = answer(robot, behind)
+    assert [(c.effect, c.target) for c in result.causes] == [("backlash", "rail")]
+    low, high = result.causes[0].parameters["width_mm"].ci95
+    assert low < 0.3 < high and high - low < 0.06
 
 
 def test_a_slide_that_rolls_is_unknown_and_depends_on_where_it_stands(robot):

@@ -110,7 +110,7 @@ def proposed(bench: ArmBench, columns: Sequence[Column], covariance: Floats, noi
     poses = _as_poses(q)
     stood = bench.standing(poses, ()).hung
     poses = replace(poses, tip=bench.start[0].tips(stood.point, stood.rotation))
-    there = ArmBench(robot=bench.robot, causes=bench.causes, campaigns=[poses])
+    there = bench.having([poses])
     group = there.groups(columns, noise)[0]
     k = len(columns)
     whole = np.diag(np.concatenate([np.ones(k), np.full(9, 1.0 / FREE)]))

@@ -21,6 +21,7 @@ from camcomp.diagnosis.model.group import Group
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
+from camcomp.model.axes import slides_of
 from camcomp.model.effect import Cause, Load, Motion, Parameter, applies, nominal, public_values
 from camcomp.model.statics.arm import ARM_LENGTH, Arm, arm_of
 from camcomp.model.statics.description import Actuator, Link, Robot
@@ -35,9 +36,10 @@ EffectShape = tuple[
     tuple[str, float, float, float], ...
 ]  # what shapes an effect: name, value, and between which values it lies
 _WRIST = {"joint_coupling": 2}  # effects of the last joints only: of how many
+_SLIDES = ("backlash",)  # effects of slides only: what a standing hinge has of it is joint_hysteresis
 # Effects of these hooks stand still, or are part of the registration.
 _UNSEEN = (
-    "time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_lag", "backlash", "friction", "inertia", "none",
+    "time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_lag", "friction", "inertia", "none",
 )  # fmt: skip
 
 
@@ -129,7 +131,7 @@ class Column:
         return Cause(self.effect, self.module, self.target, values)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LoadedArm:
     """An arm that stands in poses with causes on it: where its platform hangs, and what the tool behind it is told."""
 
@@ -137,10 +139,14 @@ class LoadedArm:
     causes: tuple[Cause, ...]
     load: Load
     motion: Motion
+    robot: Robot
+    origin: Floats
 
     def tips(self, at: Registration) -> Floats:
         """Tips (n, 3) in the machine frame, without the nuisances of a registration."""
-        return signal_path.posed(self.causes, at.tips(self.hung.point, self.hung.rotation), self.load, self.motion)
+        tip = at.tips(self.hung.point, self.hung.rotation)
+        tip = signal_path.led(self.causes, tip, self.motion, self.robot, self.origin)
+        return signal_path.posed(self.causes, tip, self.load, self.motion)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -148,7 +154,7 @@ class ArmBench:
     """An arm's model and its campaigns, the first `fitted` of which are fitted (None: all); the others are judged.
 
     start: first registration of every campaign; owner: of every campaign, the one whose frames it has. A judged campaign
-    has those of the fitted one with its label, else its own.
+    has those of the fitted one with its label, else its own. origin (3,): of the program, machine frame, mm.
     """
 
     robot: Robot
@@ -157,6 +163,7 @@ class ArmBench:
     fitted: int | None = None
     start: list[Registration] = field(default_factory=list)
     owner: list[int] = field(default_factory=list)
+    origin: Floats = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         self.arm: Arm = _need(arm_of(self.robot))
@@ -170,6 +177,10 @@ class ArmBench:
                 continue
             hung = self.standing(each, ()).hung
             self.start.append(register(each.tip, hung.point, hung.rotation, self.robot.tool))
+
+    def having(self, campaigns: Sequence[Poses], fitted: int | None = None) -> ArmBench:
+        """The same arm with other campaigns."""
+        return ArmBench(robot=self.robot, causes=self.causes, campaigns=[*campaigns], fitted=fitted, origin=self.origin)
 
     @property
     def own(self) -> tuple[int, ...]:
@@ -196,7 +207,7 @@ class ArmBench:
         grown = signal_path.grown(causes, self.actuators, motion)
         if grown is not None:
             hung = replace(hung, point=hung.point + grown_way(robot, q, grown))
-        return LoadedArm(hung, tuple(causes), load, motion)
+        return LoadedArm(hung=hung, causes=tuple(causes), load=load, motion=motion, robot=robot, origin=self.origin)
 
     def columns(self, without: Sequence[str] = ()) -> list[Column]:
         """Every parameter of the shelf that may move a standing arm, once for each shape of effects of drives and links."""
@@ -206,7 +217,10 @@ class ArmBench:
         found: list[Column] = []
         for name, module in shelf.usable("effects", (*_UNSEEN, *without)):
             for target in self._targets(name, module):
-                own = signal_path.fitted_parameters(module, self.drive(target or self.actuators[0]).revolute)
+                own = getattr(module, "SOUGHT", {}).get(target)
+                if own is None:
+                    one = self.drive(target if target in self.actuators else self.actuators[0])
+                    own = signal_path.fitted_parameters(module, one.revolute)
                 shapes: list[EffectShape] = [()]
                 if scanned := any(p.scan for p in own):
                     of_arm = hasattr(module, "on_drive") or hasattr(module, "on_links")
@@ -215,15 +229,21 @@ class ArmBench:
         return found
 
     def _targets(self, name: str, module: Any) -> list[str | None]:
-        """Where an effect may act on this arm."""
+        """Where an effect may act: on this arm, or on a machine whose slides X, Y, Z carry each other."""
         stiff = any(a.stiffness is not None for a in self.robot.actuators)
         missing = name == "drive_stiffness" and not stiff
         missing |= name == "link_stiffness" and not any(isinstance(e, Link) for e in self.arm.chain.elements)
-        if missing or module.TARGET == "named":  # of axes that arms do not have
+        slides = [not a.revolute for a in self.robot.actuators]
+        if missing or (getattr(module, "ARM_ONLY", False) and all(slides)):
             return []
+        if module.TARGET == "named":
+            square = {axis for axis, _, _ in slides_of(self.robot)} == {0, 1, 2}
+            return list(getattr(module, "SOUGHT", module.TARGETS)) if square else []
         common = module.TARGET == "machine" or (module.TARGET == "either" and any(p.scan for p in module.PARAMETERS))
         targets: list[str | None] = [None] if common else []
         targets += [] if module.TARGET == "machine" else list(self.actuators)[-_WRIST.get(name, 0) :]
+        if name in _SLIDES:
+            targets = [each for each, slide in zip(self.actuators, slides, strict=True) if slide]
         return [each for each in targets if applies(module, self.robot, each)]
 
     @property
@@ -375,7 +395,7 @@ def _standing(robot: Robot, campaign: Poses) -> Motion:
     way = zero if campaign.approach is None else campaign.approach
     return Motion(
         time=campaign.time, common=campaign.time, cut_min=worn, temperature=campaign.temperature, encoder=campaign.q,
-        speed=zero, direction=way, home=home, stiffness=signal_path.springs(robot), ordered=False,
+        speed=zero, direction=way, came=way, home=home, stiffness=signal_path.springs(robot), ordered=False,
         masses=cache(partial(mass_loads, robot, campaign.q)),
         held=cache(lambda: hang(robot, campaign.q, None, campaign.torque).drive),
     )  # fmt: skip

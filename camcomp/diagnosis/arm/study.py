@@ -44,9 +44,15 @@ LOOSE_FRAME = 1e-3  # ratio of singular values of a frame's columns below which 
 
 
 def solve(
-    robot: Robot, causes: Sequence[Cause], runs: Sequence[Poses], holdout: Sequence[str], without: Sequence[str],
+    *,
+    robot: Robot,
+    causes: Sequence[Cause],
+    runs: Sequence[Poses],
+    holdout: Sequence[str],
+    without: Sequence[str],
     stated: StatedDeviation,
-) -> PoseCase:  # fmt: skip
+    origin: Floats,
+) -> PoseCase:
     """Explain the campaigns of runs; those of `holdout` are judged and never fitted.
 
     Raises ValueError when every run is held out, or a campaign has too few poses for its frames.
@@ -55,7 +61,8 @@ def solve(
     if not own:
         raise ValueError("every run is held out")
     every = [drawn(each) for each in (*own, *held)]
-    bench, shelf, outliers, rest = cleaned(robot, tuple(causes), every, len(own), without)
+    bench = ArmBench(robot=robot, causes=tuple(causes), campaigns=every, fitted=len(own), origin=origin)
+    bench, shelf, outliers, rest = cleaned(bench, without)
     weights = [huber(each) for each in rest]
     gaps = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
     least = tip_floor(robot, bench.campaigns, gaps, stated, least=True)
@@ -81,17 +88,17 @@ def solve(
     )  # fmt: skip
 
 
-def bench_of(robot: Robot, causes: tuple[Cause, ...], runs: Sequence[Poses], holdout: Sequence[str]) -> ArmBench:
+def bench_of(
+    robot: Robot, causes: tuple[Cause, ...], runs: Sequence[Poses], holdout: Sequence[str], origin: Floats
+) -> ArmBench:
     """All poses of the campaigns that are fitted and judged, with the frames that they are judged in."""
     own, held, _ = campaigns_of(robot, runs, holdout)
-    return ArmBench(robot=robot, causes=causes, campaigns=[*own, *held], fitted=len(own))
+    return ArmBench(robot=robot, causes=causes, campaigns=[*own, *held], fitted=len(own), origin=origin)
 
 
-def cleaned(
-    robot: Robot, causes: tuple[Cause, ...], campaigns: list[Poses], fitted: int, without: Sequence[str]
-) -> tuple[ArmBench, Shelf, list[tuple[str, int]], list[Floats]]:
+def cleaned(bench: ArmBench, without: Sequence[str]) -> tuple[ArmBench, Shelf, list[tuple[str, int]], list[Floats]]:
     """Bench without poses that are outliers of the richest model, and the residuals (n, 3) mm that this model leaves."""
-    bench = ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted)
+    campaigns = list(bench.campaigns)
     shelf = Shelf.of(bench.columns(without))
     outliers: list[tuple[str, int]] = []
     left = []
@@ -101,7 +108,7 @@ def cleaned(
         outliers += named_rows(poses, far)
         campaigns[k] = poses.take(~far)
         left.append(rest[~far])
-    return ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted), shelf, outliers, left
+    return bench.having(campaigns, bench.fitted), shelf, outliers, left
 
 
 def huber(left: Floats) -> Floats:
@@ -120,7 +127,7 @@ def residuals_of_richest(bench: ArmBench, shelf: Shelf) -> list[Floats]:
     A pose far off bends a model of many columns to itself: rows count less by their residuals in PASSES fits.
     """
     plain = shelf.without_shapes()
-    model = linearise(ArmBench(robot=bench.robot, causes=bench.causes, campaigns=bench.campaigns), plain, 1.0)
+    model = linearise(bench.having(bench.campaigns), plain, 1.0)
     left, groups = [g.y for g in model.groups], model.groups
     slab = {int(j): 1.0 for j in np.flatnonzero(model.size > 0.0)}
     for _ in range(PASSES):
@@ -269,16 +276,17 @@ def studied(
     holdout: Sequence[str] = (),
     without: Sequence[str] = (),
     stated: StatedDeviation | None = None,
+    origin: Floats | None = None,
 ) -> tuple[DiagnosisResult, tuple[str, ...]]:
     """Result for static poses of an arm, and notes for the reader of the logs.
 
     runs: one entry per run, whose label is its campaign (clamping). holdout: names of runs (`Poses.run`) that are judged and
-    never fitted. Raises ValueError when a campaign has too few poses for its frames.
+    never fitted. origin (3,): of the program, machine frame, mm. Raises ValueError when a campaign has too few poses for its frames.
     """
     with progress.part(0.0, 0.7):
         case = solve(
             robot=robot, causes=causes, runs=runs, holdout=holdout, without=without,
-            stated=StatedDeviation() if stated is None else stated,
+            stated=StatedDeviation() if stated is None else stated, origin=np.zeros(3) if origin is None else origin,
         )  # fmt: skip
     bench = case.bench
     case = without_far_judged(case)

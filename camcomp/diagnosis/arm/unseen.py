@@ -15,7 +15,7 @@ from camcomp.diagnosis.answer.unseen import JudgedRun, unseen_shrinkage
 from camcomp.diagnosis.arm.case import PoseCase, named_rows
 from camcomp.diagnosis.arm.curves import covered, seen_angles
 from camcomp.diagnosis.arm.noise_floor import far_off
-from camcomp.diagnosis.arm.poses import CURVE, LEAST_POSES, ArmBench
+from camcomp.diagnosis.arm.poses import CURVE, LEAST_POSES
 from camcomp.diagnosis.model.evidence import Background, LinearModel
 from camcomp.diagnosis.model.folds import REGIONS, Excess, excess_of, folds_of
 from camcomp.diagnosis.model.group import Group, split_regions
@@ -65,7 +65,7 @@ def without_far_judged(case: PoseCase) -> PoseCase:
     if len(outliers) == len(case.outliers):
         return case
     model = replace(case.model, groups=tuple(groups))
-    bench = ArmBench(robot=bench.robot, causes=bench.causes, campaigns=campaigns, fitted=bench.fitted)
+    bench = bench.having(campaigns, bench.fitted)
     return replace(case, bench=bench, explanation=replace(case.explanation, model=model), outliers=tuple(outliers))
 
 

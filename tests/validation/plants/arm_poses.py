@@ -27,10 +27,10 @@ def platform(q):
     return serial.settle(arm, q, np.zeros(3)).tip
 
 
-def measured(q, seed, *, longer=0.0, soft=0.0, offset=0.0, noise=0.02, error=0.0, at=0.0):
+def measured(q, seed, *, longer=0.0, soft=0.0, offset=0.0, noise=0.02, error=0.0):
     """Tracker points (n, 3) at joints q (n, 6): elbow link longer, shoulder lift soft (rad/Nmm), elbow off by an angle.
 
-    error (n, 6) rad: what the joints stand off their encoders besides. at (n, 3) mm: where the arm's base stands.
+    error (n, 6) rad: what the joints stand off their encoders besides.
     """
     arm = []
     for i, ((a, alpha, d), (kg, centre)) in enumerate(zip(JOINTS, MASS, strict=True)):
@@ -39,6 +39,6 @@ def measured(q, seed, *, longer=0.0, soft=0.0, offset=0.0, noise=0.02, error=0.0
         arm += [serial.Shift((a - longer if i == 2 else a, 0.0, d), tuple(turn)), serial.Weight(kg * 9.80665, centre)]
     arm.append(serial.Shift(TOOL))
     rng = np.random.default_rng(seed)
-    tip = at + serial.settle(arm, q + error + offset * np.eye(6)[2], np.zeros(3)).tip
+    tip = serial.settle(arm, q + error + offset * np.eye(6)[2], np.zeros(3)).tip
     frame = Rotation.from_euler("XYZ", rng.uniform(-0.3, 0.3, 3))
     return frame.apply(tip) + rng.uniform(-3000, 3000, 3) + noise * rng.standard_normal(tip.shape)
