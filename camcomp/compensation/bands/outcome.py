@@ -50,8 +50,7 @@ class BandTotals:
     def __init__(self, inputs: Sequence[UncertainJob]) -> None:
         self.inputs = [each.source for each in inputs]
         self.points, self._square, self._by_input = 0, 0.0, np.zeros(len(inputs))
-        self._kept: list[tuple[Floats, TipMoves]] = []
-        self._weight: list[int] = []
+        self._kept: list[tuple[int, Floats, TipMoves]] = []  # how many points, errors and moves at some of them
         self.shrunk = self.alone = 0  # points that take less than all of the correction, and none of it
 
     def add(self, error: Floats, moves: TipMoves, share: Floats | None = None) -> None:
@@ -69,15 +68,13 @@ class BandTotals:
         self._square += float((mean**2).sum() + squares.sum())
         self._by_input += squares
         some = np.unique(np.linspace(0, len(error) - 1, min(len(error), POINTS)).astype(int))
-        self._kept.append((error[some], moves.take(some)))
-        self._weight.append(len(error))
+        self._kept.append((len(error), error[some], moves.take(some)))
 
     def join(self, other: BandTotals) -> BandTotals:
         """Add the totals of another part of the program; return self."""
         self.points, self._square = self.points + other.points, self._square + other._square
         self._by_input = self._by_input + other._by_input
         self._kept += other._kept
-        self._weight += other._weight
         self.shrunk, self.alone = self.shrunk + other.shrunk, self.alone + other.alone
         return self
 
@@ -87,7 +84,7 @@ class BandTotals:
             return ExpectedError.model_construct(rms_um=0.0, p95_um=0.0, rms_ci95_um=(0.0, 0.0))
         z = np.random.default_rng(0).standard_normal((len(self.inputs), MACHINES))
         total, sizes, weights = np.zeros(MACHINES), [], []
-        for (error, moves), count in zip(self._thinned(), self._weight, strict=True):
+        for count, error, moves in self._thinned():
             square = ((error[:, :, None] + moves.drawn(z)) ** 2).sum(axis=1)
             total += count * square.mean(axis=0)
             sizes.append(square.ravel())
@@ -108,10 +105,10 @@ class BandTotals:
         order = np.argsort(-shares, kind="stable")
         return [(self.inputs[k].name, float(shares[k])) for k in order]
 
-    def _thinned(self) -> list[tuple[Floats, TipMoves]]:
+    def _thinned(self) -> list[tuple[int, Floats, TipMoves]]:
         """Of every piece as many points as keep them all together near POINTS."""
-        stride = max(1, sum(len(error) for error, _ in self._kept) // POINTS)
-        return [(error[::stride], moves.take(np.arange(0, len(error), stride))) for error, moves in self._kept]
+        some = slice(None, None, max(1, sum(len(error) for _, error, _ in self._kept) // POINTS))
+        return [(count, error[some], moves.take(some)) for count, error, moves in self._kept]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -82,11 +82,7 @@ class InterpolatedMachine:
         """Response around targets (n, 3) under forces (n, 3); at the `ends` (n,) with drives, tilt and set-points."""
         known, m = self._known(force), len(self.machine.actuators)
         at, between = np.flatnonzero(ends), np.flatnonzero(~ends)
-        answer, tile, status = (
-            np.empty((len(target), BASIC)),
-            np.empty(len(target), np.int64),
-            np.zeros(len(target), np.int64),
-        )
+        answer, (tile, status) = np.empty((len(target), BASIC)), np.zeros((2, len(target)), np.int64)
         known.widen(force)
         found, nominal, tile[at] = self._looked(known, target.take(at, axis=0), force.take(at, axis=0))
         answer[at], rest = found[:, :BASIC], found[:, BASIC:]

@@ -252,13 +252,8 @@ class _Leading:
         """
         track, way, free, slope = self.track, self.way, self.free[k], self.slope[k]
         piece, w = way.piece[k : k + 1], way.w[k : k + 1]
-        tool, force, share, before, behind = (
-            int(track.path.tool[track.motion[piece[0]]]),
-            start,
-            1.0,
-            None,
-            _behind(bend),
-        )
+        tool, behind = int(track.path.tool[track.motion[piece[0]]]), _behind(bend)
+        force, share, before = start, 1.0, None
         for _ in range(TRIES):
             tip, direction = free + slope @ force, way.direction[k]
             if behind is not None:

@@ -278,18 +278,11 @@ class _Points:
         """What machines that may be leave at the ends (k,) of moves; the other points are only there because drives remember."""
         job, track, shares = self.asked.job, self.asked.track, self.asked.shares
         at = np.arange(len(end)) if job.causes else np.flatnonzero(end)
-        piece, w, commanded, end, tip, travel = (
-            self.piece[at],
-            w[at],
-            self.commanded[at],
-            end[at],
-            tip[at],
-            travel.take(at),
-        )
-        moves = tip_moves(job, track, piece, w, commanded=commanded, travel=travel, base=tip)
-        taken = None if shares is None else shares.at(track, piece, w)[end]
+        piece, w, tip, ends = self.piece[at], w[at], tip[at], np.flatnonzero(end[at])
+        moves = tip_moves(job, track, piece, w, commanded=self.commanded[at], travel=travel.take(at), base=tip)
+        taken = None if shares is None else shares.at(track, piece, w)[ends]
         totals = BandTotals(tip_field_of(job).inputs)
-        totals.add((tip - track.points(piece, w))[end], moves.take(np.flatnonzero(end)), taken)
+        totals.add((tip - track.points(piece, w))[ends], moves.take(ends), taken)
         return totals
 
     def by_line(self, w: Floats, judged: Bools, residual: Floats, missed: Floats | None) -> list[LineResult]:
