@@ -15,7 +15,7 @@ def shifted(values: Floats, motion: Motion, which: Floats, law: EmpiricalLaw) ->
     """Copy of values (n, m) of actuators with the law added at its targets."""
     out = values.copy()
     for j in np.flatnonzero(which):
-        out[:, j] += law.values(DriveRows(motion, int(j), followed=values[:, j] if law.on == "control" else None))
+        out[:, j] += law.values(DriveRows(motion, int(j), followed=values if law.on == "control" else None))
     return out
 
 

@@ -76,8 +76,9 @@ class Motion:
 
     `direction` is the sign of travel with memory: +1, -1, between them within the presliding distance of a reversal, 0
     before the first move. `ordered` is false for poses that are not a movement. `held` computes the modelled forces of the
-    drives `names` against the load; `told` the tips of the set-points; `masses` the loads of the stated masses. These three
-    are None where they are unknown.
+    drives `names` against the load; `told` the tips of the set-points; `masses` the loads of the stated masses; `stated_loads`
+    those on the drives by weight and by inertia, where the drives are at other positions (n, m). These four are None where they
+    are unknown.
     """
 
     time: Floats  # (n,) s since the start of the run
@@ -99,6 +100,7 @@ class Motion:
     came: Floats | None = (
         None  # (n, m) of standing poses: way in which every drive came there, 1 or -1, 0 where unknown
     )
+    stated_loads: Callable[["Motion", Floats], tuple[Floats, Floats]] | None = None
     friction: Floats | None = None  # (m,) Coulomb force behind the play of a drive, N or N mm; NaN: not stated
     seams: Seams | None = None  # where a recording begins or goes on in motion; None: it starts at rest
     measured_force: bool = False  # the cutting force is measured, so that errors of a force model do not act

@@ -20,7 +20,7 @@ from camcomp.model.config.key_reference import ROOTS, default_text, rows, sectio
 from camcomp.model.config.load import params_of
 from camcomp.model.config.yaml_text import read_tree
 from camcomp.model.config.yaml_tree import Node, plain
-from camcomp.model.law.covariates import AT_DRIVE, AT_TIP, LOADS
+from camcomp.model.law.covariates import AT_DRIVE, AT_TIP, FOLLOWED_LOADS, LOADS
 from camcomp.model.law.expression import FUNCTIONS
 from camcomp.model.motion.log_columns import DYNO, LINE, TEMPERATURE, TIME, TIP, TIP_SD
 from camcomp.terminal.cli import cli
@@ -185,7 +185,12 @@ def _formulas() -> list[str]:
     ]
 
 
-_COVARIATES = (("structure, tool, workpiece", AT_TIP), ("control, drive", AT_DRIVE), ("drive", LOADS))
+_COVARIATES = (
+    ("structure, tool, workpiece", AT_TIP),
+    ("control, drive", AT_DRIVE),
+    ("control", FOLLOWED_LOADS),
+    ("drive", LOADS),
+)
 
 
 def _first(member: Any) -> str:

@@ -23,6 +23,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.axes import slides_of
 from camcomp.model.effect import Cause, Load, Motion, Parameter, applies, nominal, public_values
+from camcomp.model.law.covariates import loads_along
 from camcomp.model.statics.arm import ARM_LENGTH, Arm, arm_of
 from camcomp.model.statics.description import Actuator, Link, Robot
 from camcomp.model.statics.hanging import Hung, grown_way, hang, tool_wrench
@@ -398,6 +399,7 @@ def _standing(robot: Robot, campaign: Poses) -> Motion:
         speed=zero, direction=way, came=way, home=home, stiffness=signal_path.springs(robot), ordered=False,
         masses=cache(partial(mass_loads, robot, campaign.q)),
         held=cache(lambda: hang(robot, campaign.q, None, campaign.torque).drive),
+        stated_loads=partial(loads_along, robot),
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ An effect that is linear in its parameter has its column once and for all; any o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import product
@@ -23,8 +23,9 @@ from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Motion, Parameter, applies, nominal, public_values
 from camcomp.model.hysteresis import direction
-from camcomp.model.law.covariates import AT_DRIVE, DriveRows
+from camcomp.model.law.covariates import DriveRows
 from camcomp.model.law.expression import parse
+from camcomp.model.law.spec import known_names
 from camcomp.model.motion.between_rows import between_rows
 from camcomp.model.seams import Seams
 from camcomp.model.statics.description import Actuator, Robot
@@ -89,6 +90,7 @@ class DrivenAxis:
 
     weight, inertia (n,): load of the stated masses on the drive, N or N mm; 0 where none are stated. way (n,): of the axis,
     where it is known better than by its encoder, in the study's mm. temperature (n,): C, None where none is logged.
+    stated_loads: as a `Motion` has them; None where no masses are stated.
     """
 
     run: AxisRun
@@ -98,6 +100,7 @@ class DrivenAxis:
     inertia: Floats
     way: Floats | None = None
     temperature: Floats | None = None
+    stated_loads: Callable[[Motion, Floats], tuple[Floats, Floats]] | None = None
 
     @cached_property
     def asked(self) -> Motion:
@@ -154,8 +157,8 @@ class DrivenAxis:
 
     def laws(self, texts: Sequence[str], causes: Sequence[Cause]) -> Floats:
         """Effect of formulas that deflect the loop behind causes on the following error (n, q), in the study's mm."""
-        rows = DriveRows(self.asked, 0, followed=self.followed(causes)[:, 0])
-        added = np.stack([parse(text, AT_DRIVE)(rows, rows.rows) for text in texts], axis=1)
+        rows = DriveRows(self.asked, 0, followed=self.followed(causes))
+        added = np.stack([parse(text, known_names("control"))(rows, rows.rows) for text in texts], axis=1)
         deflected = self.deflected(self.asked.time, added, causes)
         return -self.lever * np.stack([np.interp(self.run.time, self.asked.time, each) for each in deflected.T], axis=1)
 
@@ -189,7 +192,7 @@ class DrivenAxis:
             temperature=None if self.temperature is None else np.interp(time, self.run.time, self.temperature),
             speed=speed, direction=direction(position), home=np.array([self.actuator.home]),
             stiffness=np.array([np.inf if self.actuator.stiffness is None else self.actuator.stiffness]),
-            names=(self.actuator.name,), masses=lambda: loads,
+            names=(self.actuator.name,), masses=lambda: loads, stated_loads=self.stated_loads,
         )  # fmt: skip
         return replace(plain, seams=Seams(np.zeros(1, int), np.full(1, np.inf), first))
 

@@ -15,10 +15,9 @@ from camcomp.ground.datatypes import STANDARD_GRAVITY, Floats
 from camcomp.ground.records import replace
 from camcomp.model.statics.arm import ARM_LENGTH
 from camcomp.model.statics.description import Actuator, Chain, Element, Weight
-from camcomp.model.statics.masses import bodies_of
+from camcomp.model.statics.masses import moving_bodies
 
 PLACES = ARM_LENGTH * np.vstack([np.zeros(3), np.eye(3), -np.eye(3), 1.0 - np.eye(3)])  # of masses of 1 t, mm
-STEP_S = 1e-3  # half width of the second difference of places
 
 
 def torque_columns(chain: Chain, joint: int, q: Floats, speed: Floats, acceleration: Floats) -> Floats:
@@ -33,9 +32,6 @@ def torque_columns(chain: Chain, joint: int, q: Floats, speed: Floats, accelerat
         behind = sum(isinstance(each, Actuator) for each in elements) > joint
         elements += [Weight(-up, place) for place in PLACES] if behind and isinstance(e, Actuator) else []
     heavy = replace(chain, elements=tuple(elements))
-    around = (q + s * STEP_S * speed + 0.5 * STEP_S**2 * acceleration for s in (-1.0, 1.0))
-    columns = []
-    for here, before, after in zip(*(bodies_of(heavy, each) for each in (q, *around)), strict=True):
-        speeding = (before.centre - 2.0 * here.centre + after.centre) / STEP_S**2
-        columns.append(here.drive(here.joints[joint], speeding + up))
+    moving = moving_bodies(heavy, q, speed, acceleration)
+    columns = [body.drive(body.joints[joint], speeding + up) for body, speeding in moving]
     return np.stack(columns, axis=1)

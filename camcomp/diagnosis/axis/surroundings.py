@@ -4,19 +4,22 @@ axes, and how far their errors move the tip.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
+from scipy.interpolate import Akima1DInterpolator
 
 from camcomp.diagnosis.axis.effect_columns import DrivenAxis
 from camcomp.diagnosis.axis.findings import ROWS, AxisRun, lever_mm
 from camcomp.diagnosis.axis.rigid_bodies import torque_columns
-from camcomp.diagnosis.axis.terms import AxisTravel, travel
+from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, travel
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground.datatypes import STANDARD_GRAVITY, Floats
 from camcomp.model import signal_path
-from camcomp.model.effect import Cause
+from camcomp.model.effect import Cause, Motion
+from camcomp.model.law.covariates import loads_along
 from camcomp.model.statics.arm import ARM_LENGTH, arm_of
 from camcomp.model.statics.description import Actuator, Robot
 from camcomp.model.statics.hanging import hang, tool_wrench
@@ -47,7 +50,8 @@ class AxisSurroundings:
             return bare
         j, q = self.index(name), self.coordinates(run.name, run.time)
         inertia = mass_loads(self.robot, q, run.time).drive[:, j]
-        return replace(bare, weight=hang(self.robot, q).drive[:, j], inertia=inertia)
+        weight = hang(self.robot, q).drive[:, j]
+        return replace(bare, weight=weight, inertia=inertia, stated_loads=self._loads_behind(name, run))
 
     def coordinates(self, run: str, time: Floats) -> Floats:
         """Coordinates (n, m) of all actuators in a run, mm or rad; an axis that is not logged stands at its start."""
@@ -62,6 +66,25 @@ class AxisSurroundings:
                 out.append(np.interp(time, own.time[known], own.encoder[known]) / lever_mm(own.revolute))
         return np.stack(out, axis=1)
 
+    def _loads_behind(self, name: str, run: AxisRun) -> Callable[[Motion, Floats], tuple[Floats, Floats]]:
+        """Function that returns the loads (n, 1) of the stated masses on an axis at positions (n, 1), while the others move as
+        local cubics of their encoders do.
+        """
+        robot, at = self.robot, self.index(name)
+        assert robot is not None
+        others = cache(partial(self.others, name, run, WIDE[0]))
+
+        def loads(motion: Motion, q: Floats) -> tuple[Floats, Floats]:
+            every = self.coordinates(run.name, motion.time)
+            for other, own in others().items():
+                way = Akima1DInterpolator(own.time, own.position / self._lever(other))
+                every[:, self.index(other)] = way(np.clip(motion.time, own.time[0], own.time[-1]))
+            every[:, at] = q[:, 0]
+            weight, inertia = loads_along(robot, motion, every)
+            return weight[:, [at]], inertia[:, [at]]
+
+        return loads
+
     def bodies(self, name: str, run: AxisRun, moved: AxisTravel, wide: int) -> tuple[Floats, Floats]:
         """Columns (n, c) of the bodies behind a hinge in its torque, and their part that is weight.
 
@@ -75,7 +98,7 @@ class AxisSurroundings:
         q = self.coordinates(run.name, moved.time)
         speed, acceleration = np.zeros_like(q), np.zeros_like(q)
         for other, own in (self.others(name, run, wide) | {name: moved}).items():
-            j, lever = self.index(other), lever_mm(self.robot.actuators[self.index(other)].revolute)
+            j, lever = self.index(other), self._lever(other)
             speed[:, j] = np.interp(moved.time, own.time, own.speed) / lever
             acceleration[:, j] = np.interp(moved.time, own.time, own.acceleration) / lever
         at = self.index(name)
@@ -117,6 +140,11 @@ class AxisSurroundings:
             if np.isfinite(own.encoder).all() and np.ptp(own.encoder) > 0.0:
                 out[other] = travel(own.time, own.encoder, wide)
         return out
+
+    def _lever(self, name: str) -> float:
+        """Way of an actuator in the study's mm per unit of its coordinate."""
+        assert self.robot is not None
+        return lever_mm(self.robot.actuators[self.index(name)].revolute)
 
     def index(self, name: str) -> int:
         """Number of an actuator."""

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.ground.records import dataclass, field
 from camcomp.model.effect import Load, Motion
+from camcomp.model.statics.description import Robot
+from camcomp.model.statics.masses import weight_and_inertia
 
 _TIME = {
     "temp_C": "temperature of the drives",
@@ -43,6 +45,12 @@ AT_DRIVE = {
     "followed_rad_per_s2": "its acceleration",
     **_TIME,
 }
+FOLLOWED_LOADS = {
+    "followed_weight_N": "force of a slide's drive against the weight of the stated masses, at the positions that the effects listed above make of the set-points of all actuators; 0 where no masses are stated",
+    "followed_weight_Nmm": "torque of a hinge's drive against it",
+    "followed_inertia_N": "force of a slide's drive that accelerates these masses, by the motion of all actuators",
+    "followed_inertia_Nmm": "torque of a hinge's drive that does",
+}
 LOADS = {
     "load_N": "force that the drive exerts on its slide against load and weight, as modelled",
     "load_Nmm": "torque that the drive of a hinge exerts",
@@ -51,6 +59,7 @@ LOADS = {
 }
 _LOAD = re.compile(r"load(?:_(\w+))?_(?:N|Nmm)")
 REFERENCE_C = 20.0
+LOAD_STEP_S = 0.005  # between instants at which loads of masses are worked out, in a straight line between them
 SMOOTH_S = 0.02  # over which the motion behind a loop is smooth
 
 
@@ -113,8 +122,8 @@ class TipRows(Mapping[str, Floats]):
 class DriveRows(Mapping[str, Floats]):
     """Covariates of n rows at drive j, computed on access: of its set-points at the stage control, else of its encoder.
 
-    loads: names of drive loads that iteration lists in addition; access works for any. followed (n,): position of the drive
-    behind the effects above the law, mm or rad; None: as `motion` has it.
+    loads: names of drive loads that iteration lists in addition; access works for any. followed (n, m): positions of all
+    drives behind the effects above the law, mm or rad; None: as `motion` has them.
     """
 
     motion: Motion
@@ -133,14 +142,27 @@ class DriveRows(Mapping[str, Floats]):
             return _of_time(name, self.motion)
         if is_load(name):
             return self._load(load_of(name))
+        if name in FOLLOWED_LOADS:
+            return self._weight_and_inertia["inertia" in name][:, self.j]
         whose, _, unit = name.partition("_")
-        position = self.motion.encoder[:, self.j] if whose == "act" or self.followed is None else self.followed
+        position = (self.motion.encoder if whose == "act" else self._followed)[:, self.j]
         order = {"": 0, "_per_s": 1, "_per_s2": 2}[unit.removeprefix("mm").removeprefix("rad")]
         if whose == "followed" and order:
             return smooth_rate(position, self.motion, order)
         for _ in range(order):
             position = rate(position[:, None], self.motion)[:, 0]
         return position
+
+    @property
+    def _followed(self) -> Floats:
+        return self.motion.encoder if self.followed is None else self.followed
+
+    @cached_property
+    def _weight_and_inertia(self) -> tuple[Floats, Floats]:
+        """Loads (n, m) of the stated masses on all drives."""
+        if self.motion.stated_loads is None:
+            return np.zeros_like(self._followed), np.zeros_like(self._followed)
+        return self.motion.stated_loads(self.motion, self._followed)
 
     def _load(self, actuator: str | None) -> Floats:
         """Force (n,) N or torque N mm of this drive or another one; zero where the load is unknown."""
@@ -158,6 +180,19 @@ class DriveRows(Mapping[str, Floats]):
     def rows(self) -> int:
         """How many, n."""
         return len(self.motion.time)
+
+
+def loads_along(robot: Robot, motion: Motion, q: Floats) -> tuple[Floats, Floats]:
+    """Loads (n, m) of the stated masses on rigid drives, by weight and by inertia, of drives at q (n, m) in a motion."""
+    rates = (np.stack([smooth_rate(each, motion, order) for each in q.T], axis=1) for order in (1, 2))
+    if not motion.ordered or not len(q):
+        return weight_and_inertia(robot, q, *rates)
+    some = np.union1d(np.unique(np.floor(motion.time / LOAD_STEP_S), return_index=True)[1], len(q) - 1)
+    loads = weight_and_inertia(robot, *(each[some] for each in (q, *rates)))
+    weight, inertia = (
+        np.stack([np.interp(motion.time, motion.time[some], own) for own in load.T], axis=1) for load in loads
+    )
+    return weight, inertia
 
 
 def is_load(name: str) -> bool:
@@ -188,6 +223,8 @@ def smooth_rate(values: Floats, motion: Motion, order: int) -> Floats:
 
     Source: Savitzky, Golay, Analytical Chemistry 36 (1964) 1627.
     """
+    from scipy.signal import savgol_filter  # only laws of the motion behind a loop wait for it
+
     t = motion.time
     apart = np.concatenate([[True], np.diff(t) > 1e-9]) if len(t) else np.zeros(0, bool)
     if not motion.ordered or apart.sum() < 2:

@@ -11,13 +11,13 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from camcomp.model.config.base import Limits, Spec
-from camcomp.model.law.covariates import AT_DRIVE, AT_TIP, LOADS, is_load, load_of
+from camcomp.model.law.covariates import AT_DRIVE, AT_TIP, FOLLOWED_LOADS, LOADS, is_load, load_of
 from camcomp.model.law.expression import Expression, FormulaError, parse
 from camcomp.model.law.law import AT_DRIVES, EmpiricalLaw
 from camcomp.model.law.spline_map import DEGREE, SplineMap
 
 MOST_COEFFICIENTS = 40  # along one covariate
-_EVERY = {**AT_TIP, **AT_DRIVE, **LOADS}
+_EVERY = {**AT_TIP, **AT_DRIVE, **FOLLOWED_LOADS, **LOADS}
 _WORD = re.compile(r"[A-Za-z_]\w*")
 
 
@@ -25,7 +25,7 @@ def known_names(on: str, text: str = "") -> dict[str, str]:
     """Covariates of a law at a stage, with descriptions; loads of drives are those whose names occur in `text`."""
     if on == "drive":
         return {**AT_DRIVE, **LOADS, **{word: "load of a drive" for word in _WORD.findall(text) if is_load(word)}}
-    return AT_DRIVE if on in AT_DRIVES else AT_TIP
+    return {**AT_DRIVE, **FOLLOWED_LOADS} if on in AT_DRIVES else AT_TIP
 
 
 class _LawSpec(Spec):

@@ -7,6 +7,7 @@ because a loop moves a point by what is commanded at those before it.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Motion
 from camcomp.model.hysteresis import REST_S, direction
 from camcomp.model.job import Job
+from camcomp.model.law.covariates import loads_along
 from camcomp.model.statics.solve import inverse
 
 WORDS = 3  # actuators that X, Y, Z can move one by one
@@ -86,6 +88,7 @@ def motion_of(job: Job, setpoint: Floats, travel: Travel) -> Motion:
     motion = Motion(
         time=travel.rested, common=travel.time, cut_min=travel.cut_min, temperature=heat, encoder=setpoint,
         speed=zero, direction=zero, home=job.real_machine.home, stiffness=stiffness, names=job.real_machine.actuators,
+        stated_loads=partial(loads_along, job.real_machine.robot),
     )  # fmt: skip
     encoder = signal_path.controlled(job.causes, job.real_machine.actuators, motion)
     dt = np.diff(travel.rested, prepend=travel.time[:1] - 1.0)

@@ -21,6 +21,7 @@ from camcomp.ground.records import dataclass, field, replace
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.job import Job
+from camcomp.model.law.covariates import loads_along
 from camcomp.model.motion.control_kinematics import ControlKinematics
 from camcomp.model.motion.loaded_structure import Slopes, Softer, Solved
 from camcomp.model.motion.longer_links import LongerLinks
@@ -385,6 +386,7 @@ class Twin(ControlKinematics):
             speed=zero, direction=zero, home=home, stiffness=signal_path.springs(self.robot),
             ordered=run_path.ordered, names=self.actuators, cut_before_min=run_path.cut_before_min,
             seams=None if run_path.driven is None else run_path.driven.seams, measured_force=run_path.measured_force,
+            stated_loads=partial(loads_along, self.robot),
         )  # fmt: skip
         encoder = signal_path.controlled(servo, self.actuators, motion)
         speed = np.gradient(encoder, t, axis=0) if run_path.ordered and len(t) > 1 else zero

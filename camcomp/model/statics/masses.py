@@ -30,6 +30,8 @@ from camcomp.model.statics.rotation import rotations_of
 
 ACCELERATION_STEP_S = 0.01  # half width of a second difference: above it structures of 10 to 30 Hz do not follow
 _N_PER_KG_MM_S2 = 1e-3
+_UP = np.array([0.0, 0.0, 1e3 * STANDARD_GRAVITY])  # mm/s2
+_STEP_S = 1e-3  # half width of the second difference of places
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +124,34 @@ def _loads(bodies: Sequence[_Body], speeding: Sequence[Floats], shape: tuple[int
             drive[:, joint.index] += body.drive(joint, change)
         base += np.hstack([np.broadcast_to(body.weight, change.shape), np.cross(body.centre, body.weight)])
     return MassLoads(drive, base)
+
+
+def weight_and_inertia(robot: Robot, q: Floats, speed: Floats, acceleration: Floats) -> tuple[Floats, Floats]:
+    """Forces (n, m) N, torques N mm, of rigid drives against the weight of all stated masses, and for their acceleration.
+
+    q, speed, acceleration (n, m): of all actuators, mm or rad, per s, per s^2.
+    """
+    weight, inertia, start = np.zeros(q.shape), np.zeros(q.shape), 0
+    for chain in robot.chains:
+        for body, speeding in moving_bodies(chain, q, speed, acceleration, start):
+            for joint in body.joints:
+                weight[:, joint.index] += body.drive(joint, np.broadcast_to(_UP, speeding.shape))
+                inertia[:, joint.index] += body.drive(joint, speeding)
+        start += sum(isinstance(e, Actuator) for e in chain.elements)
+    return weight, inertia
+
+
+def moving_bodies(
+    chain: Chain, q: Floats, speed: Floats, acceleration: Floats, start: int = 0
+) -> Iterator[tuple[_Body, Floats]]:
+    """Bodies of a chain in motion, each with the acceleration (n, 3) mm/s2 of its centre.
+
+    q, speed, acceleration (n, m): of all actuators. start: index of the chain's first actuator.
+    """
+    around = (q + s * _STEP_S * speed + 0.5 * _STEP_S**2 * acceleration for s in (-1.0, 1.0))
+    places = (bodies_of(chain, each, start) for each in (q, *around))
+    for here, before, after in zip(*places, strict=True):
+        yield here, (before.centre - 2.0 * here.centre + after.centre) / _STEP_S**2
 
 
 def acceleration(time: Floats, values: Floats) -> Floats:

@@ -2,14 +2,19 @@
 
 import csv
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 
 from camcomp.ground import shelf
+from camcomp.model import signal_path
 from camcomp.model.config.load import load_config
 from camcomp.model.effect import Cause, Load, Motion, applies
 from camcomp.model.job import Job
+from camcomp.model.law.covariates import loads_along
+from camcomp.model.motion.response import aim_at, respond
+from camcomp.model.motion.travel import Travel
 from camcomp.model.motion.twin import twin_of
 from camcomp.model.statics.masses import acceleration, has_moved_mass, mass_loads
 from tests.validation import runner
@@ -190,3 +195,57 @@ def test_what_masses_do_is_a_cause_only_where_masses_are_stated(machine, there):
     assert has_moved_mass(robot) is there
     assert applies(shelf.load("effects", "inertia"), robot, robot.actuators[0].name) is there
     assert applies(shelf.load("effects", "base_compliance"), robot, None) is there
+
+
+GIVES = 5e-9  # rad per N mm, of a loop without an integrator
+
+
+def weight_torques(q, h=1e-5):
+    """Torque (6,) N mm that holds the links against their weight: the rise of their centres by the joints."""
+    heights = [bodies.walk(q + e)[1][:, 2] - bodies.walk(q - e)[1][:, 2] for e in h * np.eye(6)]
+    return np.array(heights) @ [G * row[5] for row in ROWS] / (2.0 * h)
+
+
+def giving_way(tmp_path, terms):
+    """The arm with loops of A2 and A3 that give way to loads."""
+    entries = [
+        {"effect": "formula", "stage": "control", "target": a, "formula": f"-{GIVES}*({terms})"} for a in ("A2", "A3")
+    ]
+    (tmp_path / "loops.yaml").write_text(json.dumps({"effects": entries}))
+    return Job(load_config([KUKA, tmp_path / "loops.yaml"]))
+
+
+def test_loops_give_way_to_the_weight_and_the_inertia_of_all_bodies(robot, tmp_path):
+    time = np.arange(0.0, 1.2, 0.002)
+    asked = np.array([swing(t) for t in time])
+    motion = Motion(
+        time=time, common=time, cut_min=time, temperature=None, encoder=asked, speed=asked, direction=asked, home=np.zeros(6),
+        stiffness=np.ones(6), stated_loads=partial(loads_along, robot),
+    )  # fmt: skip
+    for terms, torques in (
+        ("followed_weight_Nmm", lambda t: weight_torques(swing(t))),
+        ("followed_inertia_Nmm", lambda t: bodies.inertia_torques(swing, t)),
+    ):
+        causes = giving_way(tmp_path, terms).causes
+        gap = signal_path.controlled(causes[:1], tuple(f"A{k}" for k in range(1, 7)), motion) - asked
+        assert not np.delete(gap, 1, axis=1).any()
+        want = np.array([-GIVES * torques(float(time[k]))[1] for k in (200, 555)])
+        assert gap[[200, 555], 1] == pytest.approx(want, rel=5e-3)
+
+
+def test_the_twin_has_what_a_law_of_the_weight_says_and_compensation_takes_it_out(tmp_path):
+    entries = [{"effect": "formula", "stage": "control", "target": "A2", "formula": f"-{GIVES}*followed_weight_Nmm"}]
+    program = "G21 G90 G17 G94\nS9000 M3\nG0 X0 Y0 Z0\nG1 X200 Y100 Z80 F6000\nM5\nM30\n"
+    log = simulated(tmp_path, KUKA.read_text(), program, process={"force": {"model": "none"}}, effects=entries)
+    asked = np.column_stack([log[f"cmd_A{k}_rad"] for k in range(1, 7)])
+    want = [-GIVES * weight_torques(q)[1] for q in asked]
+    assert log["act_A2_rad"] - asked[:, 1] == pytest.approx(np.array(want), rel=1e-3, abs=2e-6)
+    job, target = (
+        giving_way(tmp_path, "followed_weight_Nmm"),
+        np.array([[0.0, 0.0, 0.0], [60.0, 40.0, 20.0], [200.0, 100.0, 80.0]]),
+    )
+    travel = Travel(force=np.zeros((3, 3)), time=np.arange(3.0), cut_min=np.zeros(3), stop=np.ones(3, bool))
+    rigid = Job(load_config([KUKA]))
+    off = respond(job, target, travel)[0] - respond(rigid, target, travel)[0]
+    assert np.linalg.norm(off, axis=1).min() > 5.0
+    assert respond(job, aim_at(job, target, travel, "newton").commanded, travel)[0] == pytest.approx(target, abs=2e-5)
