@@ -173,7 +173,7 @@ def check_places(log: Logged, *, rho: Floats, tip: Floats, loaded: Callable[[], 
             if due is tip and _distance(found[rows], due=due[rows]) >= FAR_MM:
                 due = loaded()
             check_rows_together(log, what=what, found=found, due=due, other=f"the {told}s")
-            _check(log, what, found[rows], partial(_distance, due=due[rows]))
+            _check(log, what, found[rows], partial(_distance, due=due[rows]), f"the {told}s say, in the program frame")
 
 
 def check_on_program(log: Logged, what: str, found: Floats, program: Floats) -> None:
@@ -184,7 +184,7 @@ def check_on_program(log: Logged, what: str, found: Floats, program: Floats) -> 
     def nearest(points: Floats) -> float:
         return float(np.median(tree.query(points[places(points, far)])[0]))
 
-    _check(log, "tip looks" if what == "tip" else f"{what}s look", found, nearest)
+    _check(log, "tip looks" if what == "tip" else f"{what}s look", found, nearest, "the program goes")
 
 
 def places(points: Floats, far: float = FAR_MM) -> Ints:
@@ -193,8 +193,8 @@ def places(points: Floats, far: float = FAR_MM) -> Ints:
     return rows
 
 
-def _check(log: Logged, what: str, found: Floats, distance: Callable[[Floats], float]) -> None:
-    """Raise CC406 to CC408 for tips or actuators found (n, k) at a distance from the expected ones."""
+def _check(log: Logged, what: str, found: Floats, distance: Callable[[Floats], float], expected: str) -> None:
+    """Raise CC406 to CC408 for tips or actuators found (n, k) at a distance from where they are expected."""
     names = AXES if what.startswith("tip") else log.twin.actuators
     rotary = names is not AXES and bool(log.revolute.all())
     far, size, off = FAR_RAD if rotary else FAR_MM, "rad" if rotary else "mm", distance(found)
@@ -210,7 +210,7 @@ def _check(log: Logged, what: str, found: Floats, distance: Callable[[Floats], f
         for order, sign, text in column_orders(names)
     ]
     refuse_as_read(log.file, off, readings)
-    raise log.refusal("CC406", f": {what.split()[0]} {off:.3g} {size} from where the program goes")
+    raise log.refusal("CC406", f": {what.split()[0]} {off:.3g} {size} from where {expected}")
 
 
 def _distance(found: Floats, *, due: Floats) -> float:
