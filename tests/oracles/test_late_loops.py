@@ -5,8 +5,9 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.program.verify import verify
 from camcomp.model.config.load import load_config
-from camcomp.model.control import open_program
+from camcomp.model.control import open_program, program_of
 from camcomp.model.job import Job
 
 STEP_S, SPEED = 1e-5, 20.0  # of the filters; mm/s
@@ -96,3 +97,19 @@ def test_the_errors_stated_are_those_of_the_filters(tmp_path, effects, machine):
     t, off, stated = missed(tmp_path, effects, *machine)
     assert stated < 1.0e-3
     assert abs(off[t > START_S].max() - stated) < 3e-4
+
+
+CORNERS = "G21 G90 G17 G94\nG0 X0 Y0 Z0\nG1 X20 F1200\nG3 X20 Y24 J12\nG1 X0\nG3 X0 Y0 J-12\nG1 X20\nG1 Y10 F600\nG1 X5\nG2 X5 Y-10 R10\nG0 Z3\nM2\n"
+
+
+@pytest.mark.parametrize("effect", [LAG, PLAY])
+def test_verify_finds_the_lines_and_places_of_the_correction(tmp_path, effect):
+    """What lies off the path at a first guess of its place is looked for again, and lines at reversals are no joining lines."""
+    (tmp_path / "effects.yaml").write_text(f"effects: [{effect}]\n")
+    (tmp_path / "in.nc").write_text(CORNERS)
+    config = load_config(["config/orthoglide-1deg.yaml", tmp_path / "effects.yaml"])
+    program, job = open_program(str(tmp_path / "in.nc"), config), Job(config)
+    result = compensate(program, job, method="newton", tolerance_um=1.0, version="0")
+    found = verify(program_of(result.written.data, "out.nc", config), program, job)
+    assert found.joining == result.rows.joining.sum()
+    assert found.worst_um < 1e3 * np.linalg.norm(result.after, axis=1).max() + 0.3
