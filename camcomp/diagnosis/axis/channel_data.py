@@ -20,6 +20,7 @@ LEAST = 1e-3  # of the largest column: below it bodies do not show
 HEALTHY_SHARE = 0.3  # of the channel's size: scale of a size that every axis has
 FORM = 0.2  # of the torque by which friction of a hinge is smaller while it turns round: laws of that are no better than this
 CLOCK, TURNING = "clock", "turning"  # kinds: rows that are late; friction while it turns round, limited by its peak
+STATED = "load of stated masses"  # kind: that deflects a loop, where the rows show it
 BETWEEN = "between rows"  # kind: motion between two rows, as far off as it may be
 BODIES = "bodies"  # kind: masses, first moments and inertias of the links behind a hinge, as a base of their columns
 ACCELERATION = "acceleration"  # kind: what the loop of a drive does, and inertia
@@ -107,7 +108,15 @@ class ChannelData:
     def where(self, acting: Sequence[tuple[AxisCause, Floats]]) -> ChannelData:
         """The data with the healthy sizes beside causes that act, as they are with amplitudes (d,)."""
         some = [each for each in acting if each[1].any()]
-        return replace(self, healthy=[{**own, **self.deflected(k, some)} for k, own in enumerate(self.healthy)])
+        pushed = [self.deflected(k, some) for k in range(len(self.healthy))]
+        healthy = [
+            {kind: new.get(kind, own[kind]) for kind in own} for own, new in zip(self.healthy, pushed, strict=True)
+        ]
+        return replace(self, healthy=healthy)
+
+    def without(self, kind: str) -> ChannelData:
+        """The data without the healthy sizes of a kind."""
+        return replace(self, healthy=[{k: own[k] for k in own if k != kind} for own in self.healthy])
 
     def healthy_columns(self, run: int) -> Floats:
         """Columns (n, q) of healthy sizes of all kinds."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from camcomp.diagnosis.axis.channel_data import ACCELERATION, BEYOND, ChannelData
+from camcomp.diagnosis.axis.channel_data import ACCELERATION, BEYOND, STATED, ChannelData
 from camcomp.diagnosis.axis.effect_columns import AxisCause
 from camcomp.diagnosis.axis.findings import lever_mm
 from camcomp.diagnosis.axis.gate import KNOWN
@@ -65,9 +65,15 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     """The most probable causes of a channel, their sizes and the residual.
 
     Healthy sizes of a following error that are larger than on healthy machines are unmodelled, as functions of a covariate are.
-    That of the acceleration is weighed against causes beside which it is not; what is left below the floor is none.
+    That of the acceleration is weighed against causes beside which it is not; what is left below the floor is none. The load of
+    stated masses is as likely as a covariate before the rows are seen.
     """
     free = most_probable(data, terms)
+    if STATED in data.healthy[0]:
+        bare = most_probable(data.without(STATED), terms)
+        values = [fit.again(min(free.sd, bare.sd)).found.log_evidence for fit in (free, bare)]
+        if values[0] + prior_of_covariate(free.model) < values[1]:
+            data, free = data.without(STATED), bare
     large = _large(free) if data.channel == "following" else {}
     if ACCELERATION in large:
         minor = most_probable(replace(data, minor=frozenset({ACCELERATION})), terms)

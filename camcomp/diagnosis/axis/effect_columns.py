@@ -38,6 +38,7 @@ ELSEWHERE = ("joint_hysteresis", "joint_curve", "disturbance", "formula", "map",
 # Parameters of friction beside its Coulomb force, by hinge: with the speed, and with its size; then the force that standstill
 # adds, and the speed that ends it.
 DRAG = {False: ("viscous_Ns_per_mm", "asymmetry_Ns_per_mm"), True: ("viscous_Nmms_per_rad", "asymmetry_Nmms_per_rad")}
+LOAD = "(followed_weight_Nmm + followed_inertia_Nmm)"  # of the stated masses on a joint
 STRIBECK = {False: ("stribeck_N", "stribeck_mm_per_s"), True: ("stribeck_Nmm", "stribeck_rad_per_s")}
 
 
@@ -161,6 +162,11 @@ class DrivenAxis:
         added = np.stack([parse(text, known_names("control"))(rows, rows.rows) for text in texts], axis=1)
         deflected = self.deflected(self.asked.time, added, causes)
         return -self.lever * np.stack([np.interp(self.run.time, self.asked.time, each) for each in deflected.T], axis=1)
+
+    def load(self, time: Floats, way: Floats) -> Floats:
+        """Load (n,) N mm of the stated masses on the drive of a joint that goes a way (n,), the study's mm; 0 where there are none."""
+        rows = DriveRows(self._motion(time, way / self.lever), 0)
+        return parse(LOAD, known_names("control"))(rows, rows.rows)
 
     def deflected(self, time: Floats, columns: Floats, causes: Sequence[Cause]) -> Floats:
         """Columns (n, q) at instants (n,) that deflect the loop, as it follows them."""

@@ -69,16 +69,21 @@ def lags_ms() -> np.ndarray:
     return 1e3 / np.array(GAIN) * (1.0 + np.array(VISCOUS) / speed_gain(arm()))
 
 
-def log(seed: int, seconds: float) -> dict[str, np.ndarray]:
-    """Columns of a log: set-points and encoders rad, torques N mm, every ROW_S."""
+def log(seed: int, seconds: float, *, held: bool = True, rubs: bool = True) -> dict[str, np.ndarray]:
+    """Columns of a log: set-points and encoders rad, torques N mm, every ROW_S.
+
+    held: the torque makes up for the weight. rubs: joints have friction.
+    """
     rng = np.random.default_rng(seed)
     wanted, model = asked(rng, seconds), arm()
+    model.dof_frictionloss[:] *= rubs
+    model.dof_damping[:] *= rubs
     data, stiff = mujoco.MjData(model), speed_gain(model)
     data.qpos[:] = wanted[0]
     mujoco.mj_forward(model, data)
     angle, torque = np.zeros_like(wanted), np.zeros_like(wanted)
     for i, there in enumerate(wanted):
-        torque[i] = stiff * (np.array(GAIN) * (there - data.qpos) - data.qvel) + data.qfrc_bias
+        torque[i] = stiff * (np.array(GAIN) * (there - data.qpos) - data.qvel) + held * data.qfrc_bias
         data.qfrc_applied[:] = torque[i]
         mujoco.mj_step(model, data)
         angle[i] = data.qpos
