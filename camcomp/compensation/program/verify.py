@@ -227,13 +227,17 @@ class _Points:
         Where loads turn round, fractions may settle on the wrong side: there they start again at that of the point before.
         """
         size, best = self._settled(w)
+        cuts = self.path.kind[self.move] != RAPID
         for _ in range(LOOKS):
-            far, again = np.flatnonzero(size > FAR_MM), best.copy()
+            far, again = np.flatnonzero(cuts & (size > FAR_MM)), best.copy()
             again[far] = np.where(self.piece[far] == self.piece[far - 1], best[far - 1], w[far])
             if (again == best).all() or len(far) > MANY * len(w):
                 break
             other, there = self._settled(again)
+            found = (other < 0.5 * size)[far].any()
             size, best = np.where(other < size, (other, there), (size, best))
+            if not found:
+                break
         return size, best
 
     def _settled(self, w: Floats) -> tuple[Floats, Floats]:
