@@ -207,8 +207,8 @@ def _way(run: AxisRun, moved: AxisTravel, seen: np.ndarray) -> Floats:
 def _healthy(
     found: AxisFindings, rows: ChannelData, around: AxisSurroundings, axes: Sequence[DrivenAxis]
 ) -> tuple[list[dict[str, Floats]], list[dict[str, Floats]], float]:
-    """Columns of the sizes that every axis has, by kind, of every run, those that are force of inertia alone, and the speed, rad/s, up
-    to which the friction of a hinge turns round by its torque, 0 elsewhere.
+    """Columns of the sizes that every axis has, by kind, of every run, those that are force of inertia alone, and the speed, mm/s or
+    rad/s, up to which friction may turn round in a drive force.
     """
     seen, hinge, force = rows.seen, rows.hinge, rows.channel == "force"
     forces = [run.force[on] for run, on in zip(rows.runs, seen, strict=True)]
@@ -251,7 +251,7 @@ def _healthy(
                 own["stated masses"], moved["stated masses"] = loads[k], loads[k] * [0.0, 1.0]
         out.append(own)
         inertia.append(moved)
-    return out, inertia, CORNERS[-1] * turns / lever_mm(hinge)
+    return out, inertia, CORNERS[-1] * turns / lever_mm(hinge) if hinge else TURNS_MM_PER_S[-1]
 
 
 def _turns_at(rows: ChannelData, bodies: Sequence[Floats]) -> float:
