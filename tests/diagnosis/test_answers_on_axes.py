@@ -83,7 +83,6 @@ def test_an_axis_with_something_wrong(tmp_path, seed):
     assert result["verdict"] == "identified" and row["all"] and not row["false_cause"], WRONG[seed]
 
 
-@pytest.mark.campaign
 def test_friction_that_turns_round_over_a_distance_has_no_stribeck_part(tmp_path):
     """The plant's Coulomb friction, 39.7 N, is the same at all speeds."""
     (friction,) = judged(tmp_path, 90076)[0]["causes"]
@@ -91,6 +90,7 @@ def test_friction_that_turns_round_over_a_distance_has_no_stribeck_part(tmp_path
     assert low < 39.7 < high and "stribeck_N" not in friction["parameters"]
 
 
+@pytest.mark.campaign
 def test_a_cable_at_the_end_of_the_travel_is_no_push(tmp_path):
     """The axis was there once: it may be the place as well as the time."""
     result, row = judged(tmp_path, 33044)
