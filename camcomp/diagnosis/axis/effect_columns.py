@@ -74,6 +74,11 @@ class AxisCause:
         return float(min(max(value, own.low, self.least.get(name, own.low)), own.high))
 
     @property
+    def of_its_own(self) -> bool:
+        """Whether its shape is above what is nothing of its own."""
+        return all(self.shape.get(name, np.inf) > value for name, value in self.least.items())
+
+    @property
     def place(self) -> tuple[str, str]:
         """Effect and target; intervals of one target are several places."""
         return self.effect, self.target if self.run is None else f"{self.target} {self.run} {self.shape}"

@@ -239,7 +239,8 @@ def choose(channels: Sequence[LinearChannel], sd: float, places: int) -> LinearF
     known = channels[0].data.stated or channels[0].data.channel != "following"
     sd = min(sd, *(each.noise if known else each.left for each in channels))
     every = sorted((each.explained(sd, places) for each in channels), key=lambda fit: fit.found.log_evidence)
-    fits = [*{frozenset(fit.places): fit for fit in every if all(own.any() for own in fit.amounts)}.values()]
+    real = [f for f in every if all(a.any() and t.of_its_own for t, a in zip(f.terms, f.amounts, strict=True))]
+    fits = [*{frozenset(fit.places): fit for fit in real}.values()]
     p = softmax([fit.value for fit in fits])
     best = fits[int(np.argmax(p))]
     while parts := [
