@@ -97,9 +97,7 @@ class Motion:
     told: Callable[[], Floats] | None = None  # (n, 3) mm, program frame
     cut_before_min: float = 0.0  # part of cut_min in earlier runs
     masses: Callable[[], MassLoads] | None = None
-    came: Floats | None = (
-        None  # (n, m) of standing poses: way in which every drive came there, 1 or -1, 0 where unknown
-    )
+    came: Floats | None = None  # (n, m) by which way a standing drive came: 1 or -1, 0 where unknown
     stated_loads: Callable[["Motion", Floats], tuple[Floats, Floats]] | None = None
     friction: Floats | None = None  # (m,) Coulomb force behind the play of a drive, N or N mm; NaN: not stated
     seams: Seams | None = None  # where a recording begins or goes on in motion; None: it starts at rest

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from camcomp.diagnosis.axis.channel_data import ACCELERATION, BEYOND, STATED, ChannelData
+from camcomp.diagnosis.axis.channel_data import ACCELERATION, BEYOND, MASSES, ChannelData
 from camcomp.diagnosis.axis.effect_columns import AxisCause
 from camcomp.diagnosis.axis.findings import lever_mm
 from camcomp.diagnosis.axis.gate import KNOWN
@@ -69,11 +69,11 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     stated masses is as likely as a covariate before the rows are seen.
     """
     free = most_probable(data, terms)
-    if STATED in data.healthy[0]:
-        bare = most_probable(data.without(STATED), terms)
+    if MASSES in data.healthy[0]:
+        bare = most_probable(data.without(MASSES), terms)
         values = [fit.again(min(free.sd, bare.sd)).found.log_evidence for fit in (free, bare)]
         if values[0] + prior_of_covariate(free.model) < values[1]:
-            data, free = data.without(STATED), bare
+            data, free = data.without(MASSES), bare
     large = _large(free) if data.channel == "following" else {}
     if ACCELERATION in large:
         minor = most_probable(replace(data, minor=frozenset({ACCELERATION})), terms)

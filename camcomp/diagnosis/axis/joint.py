@@ -20,7 +20,7 @@ from camcomp.diagnosis.axis.channel_data import (
     ACCELERATION,
     BETWEEN,
     BODIES,
-    STATED,
+    MASSES,
     TURNING,
     ChannelData,
     base_of,
@@ -44,7 +44,7 @@ from camcomp.model.hysteresis import PRESLIDING_MM
 from camcomp.model.law.expression import washout
 
 TURNS_MM = (1e-4, 0.003, 0.02, 0.1)  # ways over which the friction of a slide turns round in its following error
-DEFLECTS = ("friction", "weight", "asymmetry", STATED)  # kinds that act on a loop
+DEFLECTS = ("friction", "weight", "asymmetry", MASSES)  # kinds that act on a loop
 INTEGRAL_S = (0.02, 0.06, 0.2)  # in which an integrator of the loop may take over what deflects it
 CORNERS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0)  # times the speed at which a hinge's friction turns round: of a polygon
 # of the fastest row: speeds at which the friction of a hinge turns round in its following error
@@ -83,7 +83,7 @@ def study_channel(found: AxisFindings, rows: ChannelData, around: AxisSurroundin
     done = fit_channel(data, terms)
     sure = [np.ones(len(each), bool) for each in rows.values]
     if following:
-        texts = _following_laws(rows) | ({STATED: (LOAD,)} if STATED in done.sizes else {})
+        texts = _following_laws(rows) | ({MASSES: (LOAD,)} if MASSES in done.sizes else {})
         behind = [term.cause(own.tolist()) for term, own in done.acting]
         done = _behind_causes(data, done, texts, [axes[k].laws(_all(texts), behind)[own] for k, own in enumerate(seen)])
         found.laws = [_written_law(found, texts, done.sizes)]
@@ -233,7 +233,7 @@ def _healthy(
             own[ACCELERATION] = m.acceleration[:, None]
         if rows.channel == "following" and hinge:
             own |= {"friction": _taken_over(np.tanh(m.speed[:, None] / _creep(rows)), m), "weight": weight}
-            own |= {STATED: axes[k].load(m.time, m.position)[:, None]} if axes[k].stated_loads else {}
+            own |= {MASSES: axes[k].load(m.time, m.position)[:, None]} if axes[k].stated_loads else {}
         elif rows.channel == "following":
             own["friction"] = _taken_over(np.stack([m.reversal(way) for way in TURNS_MM], axis=1), m)
         if rows.asymmetric:
